@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from book import BOOK
 from cycles import by_gains
 from hypothesis import given
 from hypothesis import strategies as st
@@ -299,58 +300,14 @@ def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: 
 def test_a_stage_that_rests_just_below_break_away_is_not_shaken_loose_by_rounding() -> None:
     """Behind a backlash the motor stands on its flank with 99.94 % of the static friction once the error is gone: for
     ever, at tolerances of 1e-7 to 1e-9; at 1e-6 the stage broke away again."""
-    stage = VARIANTS["rigid"].replace(
-        {
-            "masses": {"cart": "16.5568 kg", "stage": "1.56389 kg"},
-            "friction": {
-                **{"model": "lugre", "static": "30.816 N", "coulomb": "29.9691 N", "viscous": "0 N*s/m"},
-                **{"stribeck_velocity": "0.111352 mm/s", "stribeck_exponent": 2.0},
-                **{"bristle_stiffness": "7.28153e6 N/m", "bristle_damping": "3558.06 N*s/m"},
-            },
-            "transmission": {
-                **{"mass": "23.5173 kg", "stiffness": "1.88982e7 N/m", "damping": "1197.34 N*s/m"},
-                "backlash": "128.322 um",
-            },
-            "encoder": {"position": "load", "velocity": "load"},
-            "bias": {"stage": "-2.69211 N"},
-            "controller": {
-                **{"kind": "cascade", "kv": "5.9313 1/s", "kp": "609.917 N*s/m"},
-                **{"velocity_integral_time": "0.165112 s", "proportional_on": "error"},
-            },
-        }
-    )
+    stage = BOOK["just below break-away"]
     kicks = {**stage.flat(), "motion.displacement": np.array([110e-6, 141e-6, 146.3e-6, 152e-6, 160e-6])}
     ends, completed, _ = ends_in(kicks, 5, Target(77.9911e-6, 76.8975, 850.0, 212.5))
     assert completed.all()
     assert ends.tolist() == [True, False, False, False, False]
 
 
-LEANING = friso.loads(
-    """name = "Friction by direction"
-[masses]
-stage = "1.702 kg"
-[friction]
-model = "lugre"
-static = "3.377 N"
-coulomb = "1.151 N"
-stribeck_velocity = "7.764 mm/s"
-stribeck_exponent = 2
-viscous = "0.7068 N*s/m"
-bristle_stiffness = "43870 N/m"
-bristle_damping = "75.23 N*s/m"
-asymmetry = -0.35
-[controller]
-kind = "pid"
-kp = "901.9 N/m"
-ki = "7895 N/(m*s)"
-kd = "33.28 N*s/m"
-derivative_on = "measurement"
-[motion]
-kind = "release"
-displacement = "0.106 mm"
-duration = "17.4 s"
-"""
-)
+LEANING = BOOK["leaning"]
 
 
 def test_kicks_of_a_stage_that_leans_are_searched_on_both_sides() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
-from beyond_flip import CREEPING
+from book import BOOK
 
 import friso
 from friso.design_method.method import NoDesign, leaves
@@ -221,7 +221,7 @@ def test_corners_hunt_as_long_as_anything_attracts() -> None:
     """The symmetric cycle of this stage repels from 11.97 Hz on; beside it one that is not attracts up to 13.03 Hz, as
     simulations at 1e-7 and 1e-9 show."""
     one = Population({"masses.cart": np.array([2.6276])}, 1)
-    edges = edges_over(CREEPING.flat(), one, 12.1, 20.0, 8)
+    edges = edges_over(BOOK["creeping"].flat(), one, 12.1, 20.0, 8)
     assert edges.edges[0] == pytest.approx(13.03, rel=0.01)
     assert edges.unknown == 0
 

@@ -13,7 +13,6 @@ import xarray as xr
 from cycles import swings
 from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, van_dijk
 
-import friso
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -612,46 +611,3 @@ def test_nothing_is_certain_of_bristles_that_runs_do_not_resolve(rig: Stage) -> 
 def test_a_stage_without_integral_action_has_no_swings(rig: Stage) -> None:
     still = {"kind": "pid", "kp": "3e3 N/m", "ki": "0 N/(m*s)", "kd": "200 N*s/m", "tau": "1 ms"}
     assert find_swings(rig.replace({"controller": still, "joint.locked": True}).flat()) == ()
-
-
-ONE_SIDED = friso.loads(
-    """name = "Small geared motor with a strong integral"
-[axis]
-kind = "rotary"
-[masses]
-cart = "5e-6 kg*m^2"
-[friction]
-model = "lugre"
-static = "0.12 N*m"
-coulomb = "0.02 N*m"
-stribeck_velocity = "0.05 rad/s"
-stribeck_exponent = 2
-bristle_stiffness = "600 N*m/rad"
-bristle_damping = "0.02 N*m*s/rad"
-viscous = "0.001 N*m*s/rad"
-[controller]
-kind = "pid"
-kp = "4 N*m/rad"
-ki = "1500 N*m/(rad*s)"
-kd = "0.011 N*m*s/rad"
-tau = "1 ms"
-force_limit = "0.4 N*m"
-integral_limit = "0.4 N*m"
-[motion]
-kind = "step"
-size = "0.1 rad"
-duration = "4 s"
-"""
-)
-
-
-def test_a_cycle_that_leans_is_told_with_both_ends() -> None:
-    """Of the pair of mirror images the one is told in which the stage's own motion ends."""
-    end = friso.simulate(ONE_SIDED)["error"].values[-2000:]
-    lowest, highest = -end.max(), -end.min()
-    assert (lowest, highest) == pytest.approx((-1.54e-3, 10.61e-3), rel=0.005)
-    (cycle,) = hunting(ONE_SIDED, side=1.0).attracting
-    assert cycle.extremes == pytest.approx((lowest, highest), rel=0.005)
-    (mirrored,) = hunting(ONE_SIDED, side=-1.0).attracting
-    assert mirrored.extremes == pytest.approx((-highest, -lowest), rel=0.005)
-    assert np.max(mirrored.trace["error"].values) == pytest.approx(highest, rel=0.005)

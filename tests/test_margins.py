@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from book import BOOK
 from made_up import FakeCase, fake_stage, hunts, settles
 from variants import VARIANTS
 
@@ -60,20 +61,7 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_an_end_just_above_coulomb_friction_is_found() -> None:
     """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
-    stage = Stage(
-        masses={"stage": "0.009115 kg"},
-        friction={
-            **{"model": "elasto_plastic", "static": "0.2222 N", "coulomb": "0.1056 N", "viscous": "0.007666 N*s/m"},
-            **{"stribeck_velocity": "0.001483 m/s", "stribeck_exponent": 1.3, "breakaway_deflection": "2.391e-07 m"},
-            **{"bristle_stiffness": "344200.0 N/m", "bristle_damping": "38.42 N*s/m"},
-        },
-        controller={
-            **{"kind": "pid", "kp": "75.98 N/m", "ki": "3380.0 N/(m*s)", "kd": "0.7714 N*s/m", "tau": "0.002126 s"},
-            **{"derivative_on": "measurement", "force_limit": "1.68 N"},
-            **{"anti_windup": "back_calculation", "anti_windup_time": "0.01169 s"},
-        },
-        motion={"kind": "release", "displacement": "1 mm", "duration": "4 s"},
-    )
+    stage = BOOK["ends just above Coulomb friction"]
     margin = check(stage)["given"].static_friction
     assert margin is not None
     assert margin.below is not None

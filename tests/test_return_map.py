@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beyond_flip import CREEPING
+from book import BOOK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -210,7 +210,7 @@ def test_a_swing_beside_a_cycle_that_repels_is_not_taken_for_it(crossover: str) 
 @pytest.mark.parametrize("crossover", [12.975, 12.98, 12.985, 12.99])
 def test_a_cycle_on_a_narrow_piece_of_the_map_attracts(crossover: float) -> None:
     """The piece ends 0.5 % below the cycle and 1 % above it, and no start of a survey lands on it."""
-    stage = CREEPING.replace({"controller.crossover": f"{crossover} Hz", "friction.static": "28.6 N"})
+    stage = BOOK["creeping"].replace({"controller.crossover": f"{crossover} Hz", "friction.static": "28.6 N"})
     assert what_attracts(Ensemble.held(stage.flat(), 1)).attracts[0]
 
 
@@ -223,21 +223,7 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
     assert edge.factor == pytest.approx(9.5422, rel=1e-3)
 
 
-SCHEDULED = Stage(
-    masses={"stage": "4.858 kg"},
-    friction={
-        **{"model": "lugre", "static": "9.036 N", "coulomb": "5.197 N", "viscous": "1.128 N*s/m"},
-        **{"stribeck_velocity": "0.001754 m/s", "stribeck_exponent": 2.0},
-        **{"bristle_stiffness": "209900.0 N/m", "bristle_damping": "692.9 N*s/m"},
-    },
-    controller={
-        **{"kind": "pid", "kp": "4122.0 N/m", "ki": "9761.0 N/(m*s)", "kd": "122.2 N*s/m"},
-        **{"derivative_on": "error", "tau": "0.00168 s"},
-        "schedule_error": ["0.0001325 m", "0.000265 m", "0.00106 m"],
-        "schedule_factor": [0.2997, 0.656, 0.8678],
-    },
-    motion={"kind": "release", "displacement": "0.006576 m", "duration": "13.7 s"},
-)
+SCHEDULED = BOOK["scheduled"]
 """Gains follow a schedule. Below 0.8925 times its bandwidth a symmetric cycle attracts; an asymmetric one does so, from
 half of the displacements, up to between 0.910 and 0.915 times."""
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from beyond_flip import CREEPING
+from book import BOOK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -225,7 +225,7 @@ def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None
     """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
     1e-7 and 1e-9, and gone at the higher."""
     metrics = ["multiplier", "amplitude", "verdict"]
-    runs = sweep(CREEPING, {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
+    runs = sweep(BOOK["creeping"], {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
     assert runs.attractor.values[0] in ("cycle", "swing")
     assert runs.attractor.values[1] == "nothing"
     assert runs.verdict.values[0] in ("hunts", "bistable")
