@@ -207,9 +207,7 @@ def serving(port: str = "0") -> Iterator[tuple[str, str]]:
     command = [sys.executable, "-c", SERVER, "app", str(RIG), "--no-browser", "--port", port]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
-            assert server.stdout is not None
             address = re.search(r"(http://\S+/)\?\S+", server.stdout.readline())
-            assert address is not None
             yield address[0], address[1]
         finally:
             server.terminate()

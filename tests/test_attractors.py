@@ -96,8 +96,6 @@ def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
     """Beyond its flip at 11.97 Hz the creeping stage has asymmetric cycles, of one period and of many, up to 12.95 Hz,
     where the symmetric one attracts again, until it folds: by brute force between 13.026 and 13.029 Hz."""
     edge = find_margin(BOOK["creeping"].replace({"controller.crossover": f"{crossover} Hz"}), attracting=crossover < 13)
-    assert edge is not None
-    assert edge.crossover is not None
     assert edge.certain
     assert edge.crossover < 13.029
     assert edge.crossover * (1 + edge.reserve) > 13.026
@@ -131,8 +129,6 @@ SciPy at 17.8762 Hz, +-0.17156 mm (`benchmarks.truth --seed 1301 --number 72`)."
 @pytest.mark.thorough
 def test_beyond_the_end_of_a_cycle_others_attract_close_by() -> None:
     edge = find_margin(DOUBLED, attracting=True)
-    assert edge is not None
-    assert edge.crossover is not None
     assert edge.crossover * (1 + edge.reserve) > 17.8762
 
 
@@ -153,7 +149,6 @@ LOSING = draw(1301, 3)
 @pytest.mark.slow
 def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None:
     edge = find_margin(LOSING.replace({"controller.crossover": f"{1.3 * 9.79954} Hz"}), attracting=True)
-    assert edge is not None
     assert 1.3 * edge.factor <= 1.8997 * 1.002
     assert 1.3 * edge.quiet >= 1.8997 * 0.998
 
@@ -167,7 +162,6 @@ brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
 def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -> None:
     """The edge lies beyond it."""
     edge = find_margin(WINDOWED, attracting=True)
-    assert edge is not None
     assert 3 * edge.factor > 3.1
     assert 3 * edge.quiet > 3.35
 
@@ -176,7 +170,6 @@ def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -
 def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> None:
     """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
     edge = find_margin(WINDOWED.replace({"controller.crossover": "3.06 Hz"}), attracting=False)
-    assert edge is not None
     assert edge.crossover == pytest.approx(3.016, rel=2e-3)
 
 
@@ -202,12 +195,10 @@ def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
         assert (sought.hunting.target is not None) == attracting
         ends = [end for window in sought.windows for end in (window.low, window.high) if end is not None]
         if crossover < 60:
-            assert sought.margin is not None
             assert sought.margin.crossover == pytest.approx(9.77, abs=0.005)
             assert sought.windows[0].high is None
             again, expected = ends[0], UPPER
         else:
-            assert sought.lower is not None
             assert sought.lower.certain
             assert crossover * sought.lower.inside == pytest.approx(UPPER, rel=1e-4)
             assert crossover * SEARCH_LIMITS.lowest_bandwidth > 9.77  # the lower window is out of reach
@@ -279,7 +270,6 @@ def test_a_swing_of_ten_minutes_is_seen() -> None:
     """With static friction 0.5 % above Coulomb friction the stage waits five minutes at 2 mm, and keeps swinging."""
     judgement = friso.check(with_little_gap("403 N"))["given"].judgement
     assert judgement.verdict == "hunts"
-    assert judgement.cycle is not None
     assert judgement.cycle.attracts
     assert judgement.cycle.period == pytest.approx(572, rel=0.01)
 
@@ -289,7 +279,6 @@ def test_swings_that_are_smaller_than_is_looked_for_leave_a_doubt() -> None:
     """With 0.05 %, swings of an hour could exist unresolved: the motion is followed for many of them."""
     judgement = friso.check(with_little_gap("401.2 N"))["given"].judgement
     assert not judgement.hunting.certain
-    assert judgement.followed is not None
     assert judgement.followed > 5 * 3600
 
 
@@ -315,7 +304,6 @@ def test_of_several_bristles_some_remember_how_a_stage_came_to_stick(crossover: 
     few, (motion,) = find_attractors(stages.flat, 1, close_orbits=False), find_swings(stages.flat)
     assert few.decided.all()
     assert few.amplitude == pytest.approx(amplitude, rel=1e-3)
-    assert motion.seen is not None
     run = stages.run(motion.seen[None, :], np.array([120 * motion.period]), 1e-9, window=0.9)
     high, low = (run.statistics[0, STATISTICS.index(f"deviation_{side}")] for side in ("max", "min"))
     assert (high - low) / 2 == pytest.approx(amplitude, rel=1e-3)
@@ -342,7 +330,6 @@ def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_a
 def ten_times_larger(flat: dict[str, Any]) -> StageAttractors:
     """Return what attracts a stage, as if it had been seen to swing ten times as far."""
     attracted = find_attractors(flat, 1)
-    assert attracted.target is not None
     return replace(attracted, target=replace(attracted.target, amplitude=10 * attracted.target.amplitude))
 
 
@@ -389,7 +376,6 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
     2000 s on."""
     stage = BOOK["repeats every 174 s"]
     target = hunting(stage).target
-    assert target is not None
     assert 2 * target.amplitude == pytest.approx(3.4929e-3, rel=1e-3)
     own = own_motion(stage, target, np.inf)
     assert own.completed
@@ -402,7 +388,6 @@ def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_r
     """After a step of 12.09817 mm, the stage swings as far, but every 1215 s, with pauses of 940 s."""
     seldom = BOOK["repeats every 174 s"].replace({"motion.size": "-12.09817 mm"})
     target = hunting(seldom).target
-    assert target is not None
     ends, completed, swing = ends_in(seldom.flat(), 1, target)
     assert completed[0]
     assert ends[0] or swings_seldom(target, ends, swing)[0]
@@ -450,7 +435,6 @@ def test_a_stage_that_large_motions_run_away_of_settles_for_certain_from_smaller
     assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
     assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["settles"]
     away = case.judgement.running_away
-    assert away is not None
     edge, flat = away.windows[0][0], stage.replace({"motion.duration": "200 s"}).flat()
     kicked = {**flat, "motion.displacement": edge * np.array([0.98, 1.02])}
     assert run_motions(kicked, 2, measuring_options(1e-8)).away.tolist() == [False, True]
@@ -483,7 +467,6 @@ def test_a_motion_that_anti_windup_holds_far_out_is_not_said_to_run_away_for_goo
     limit = {"controller.force_limit": "10 kN", "controller.anti_windup": "back_calculation"}
     chosen = VARIANTS["rigid stage, PI"].replace({"controller.ki": "5e6 N/(m*s)"})
     case = check_given(chosen.replace({**limit, "controller.anti_windup_time": "50 ms"}))
-    assert case.judgement.hunting.target is not None
     assert float(case.judgement.hunting.target.amplitude) == pytest.approx(1399, rel=0.01)
     assert (case.verdict, case.judgement.runs_away, case.runs_away) == ("failed", False, False)
     assert check_given(chosen).runs_away

@@ -23,8 +23,6 @@ from friso.hunting.continuation.locate import turn
 from friso.stage import Stage
 from friso.studies.boundary import stability_changes
 
-pytestmark = pytest.mark.xdist_group("rigid")
-
 RIGID = VARIANTS["rigid"]
 AT_8_HZ = RIGID.replace({"controller.crossover": "8 Hz"})
 CROSSOVER = KeyRange("controller.crossover", 1.0, 40.0, unit="Hz")

@@ -73,7 +73,6 @@ def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
-@pytest.mark.xdist_group("rig")
 def test_check_is_the_batch_of_one(rig: Stage) -> None:
     """Four verdicts of stages alone, and the same stages in one batch."""
     crossovers = np.array([8.0, 10.0, 12.0, 4.0])
@@ -168,7 +167,6 @@ def test_rest_may_be_asked_for_some_time() -> None:
     assert [outcomes(end, REST_BAND, hold)[0] for hold in (0.0, 1.9, 2.1)] == ["rests", "rests", "creeps"]
 
 
-@pytest.mark.xdist_group("rig")
 def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
     """The statistics and turning points of the kernel against samples of the same runs; each alone and together."""
     crossovers = np.array([2.0, 5.0, 8.0, 9.5, 12.0, 16.0])

@@ -35,8 +35,6 @@ NEEDED = 77
 def module(name: str) -> ModuleType:
     """A script of the docs."""
     spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
     loaded = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(loaded)
     return loaded

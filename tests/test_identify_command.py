@@ -31,8 +31,6 @@ from friso.identification.stage_file import fitting, identified_stage, origins, 
 from friso.interface.answer import Answer
 from friso.stage.correlations import correlations_file, read_correlations
 
-pytestmark = pytest.mark.xdist_group("identify-moves")
-
 SMALL = OutputErrorSettings(
     points_of_a_profile=3,
     iterations_of_a_profile=1,

@@ -35,8 +35,6 @@ from friso.identification.sources import recognised
 from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
 
-pytestmark = pytest.mark.xdist_group("identify-experiments")
-
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DT = 1e-3
 LUGRE = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 0.4])

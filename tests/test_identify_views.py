@@ -48,8 +48,6 @@ from friso.stage.correlations import Correlations
 from friso_thesis.studies.identification.steps import stiffness_from_steps
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
 
-pytestmark = pytest.mark.xdist_group("identify-views")
-
 DT = 1e-3
 MASS, VISCOUS, COULOMB = 10.0, 50.0, 8.0
 WHY = "no steady motion between 1 and 20 mm/s"

@@ -32,8 +32,6 @@ OF_THE_SHELL = {"--out", "--overwrite", "--json", "--details", "--help"}
 FUNCTIONS = {"map": "sweep"}
 """Commands whose function has another name."""
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 def commands() -> dict[str, Any]:
     group = typer.main.get_command(command_line())

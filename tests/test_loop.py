@@ -145,7 +145,6 @@ def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_ou
     chosen = friso.load(friso.example("twincat_cascade"))
     (window,) = unstable_bandwidths(chosen)
     for end in (window.low, window.high):
-        assert end is not None
         assert end.reserve < 2e-4
         places = np.array([end.inside, end.outside, 1.0])
         assert loops_unstable(faster(chosen.flat(), places), 3).tolist() == [True, False, False]

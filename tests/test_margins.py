@@ -41,18 +41,13 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
     """The rigid mass hunts; with half its static friction it does not, nor with half as much again."""
     case = check(RIGID)["given"]
     margin, edge = case.static_friction, case.judgement.margin
-    assert margin is not None
     assert margin.certain
     for end in (margin.below, margin.above):
-        assert end is not None
         assert attracts(RIGID, end.inside)
         assert not attracts(RIGID, end.outside)
         assert abs(np.log(end.outside / end.inside)) < 0.06
-    assert edge is not None
     assert (edge.crossover, edge.kind, edge.certain) == (pytest.approx(9.770, abs=1e-3), "flip", True)
     assert edge.factor < edge.quiet < 1.02 * edge.factor
-    assert margin.below is not None
-    assert margin.above is not None
     assert (margin.below.kind, margin.above.kind) == ("lost", "flip")
     assert margin.below.inside < 1 < margin.above.inside
 
@@ -63,8 +58,6 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
     """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
     stage = BOOK["ends just above Coulomb friction"]
     margin = check(stage)["given"].static_friction
-    assert margin is not None
-    assert margin.below is not None
     assert margin.below.certain
     assert margin.range[0] <= margin.below.outside < 0.107 / 0.2222 < margin.below.inside < 0.112 / 0.2222
     assert attracts(stage, 0.109 / 0.2222)
@@ -75,9 +68,7 @@ def test_where_hunting_begins_is_told_of_a_stage_that_settles() -> None:
     """At half its static friction the rigid mass settles; with a little more it hunts. The first lines say so."""
     case = check(RIGID.replace({"friction.static": "1.4 N"}))["given"]
     margin = case.static_friction
-    assert margin is not None
     assert not margin.attracts
-    assert margin.above is not None
     assert margin.range == pytest.approx((1 / 1.4, 3.0))
     assert not attracts(case.stage, margin.above.outside)
     assert attracts(case.stage, margin.above.inside)

@@ -152,7 +152,6 @@ def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage) -> None:
 def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
     known = hunting(locked)
     assert known.target is not None
-    assert known.surveyed is not None
     target, landing_map = known.target, resolved_map(Ensemble.held(locked.flat(), 1), known.surveyed.motions)
     assert landing_map is not None
     long_runs = displacements_that_hunt(locked, target)
@@ -164,7 +163,6 @@ def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
 def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
     """9.750 Hz, where its cycle flips; nothing attracts a hundredth beyond."""
     margin = find_margin(locked, attracting=True)
-    assert margin is not None
     assert margin.crossover == pytest.approx(9.750, rel=2e-4)
     beyond = {**locked.flat(), "controller.crossover": 9.75 * np.array([0.99, 1.01])}
     answer = find_attractors(beyond, 2)
@@ -194,7 +192,6 @@ def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
     The sampled points of the map are farther apart there. The search alone also finds a multiplier of -0.68.
     """
     edge = find_margin(draw(7001, 83, "stages").variants()["locked"], attracting=False)
-    assert edge is not None
     assert edge.factor < 0.46474 < edge.quiet
 
 
@@ -219,7 +216,6 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
     """Many maps of this stage are not resolved; its edge at 9.54 times the bandwidth is found all the same."""
     touching = draw(7001, 47, "stages").variants()["locked"]
     edge = find_margin(touching, attracting=True)
-    assert edge is not None
     assert edge.factor == pytest.approx(9.5422, rel=1e-3)
 
 
@@ -231,7 +227,6 @@ half of the displacements, up to between 0.910 and 0.915 times."""
 @pytest.mark.slow
 def test_an_asymmetric_cycle_that_outlives_a_flip_makes_the_edge() -> None:
     edge = find_margin(SCHEDULED, attracting=False)
-    assert edge is not None
     assert 0.908 < edge.factor < 0.915 < edge.quiet < 0.921
     factors = (0.905, edge.factor * 0.998, edge.quiet)
     assert [bool(find_swings(faster(SCHEDULED.flat(), factor))) for factor in factors] == [True, True, False]

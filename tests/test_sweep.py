@@ -19,8 +19,6 @@ from friso.studies.sweep import sweep
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
@@ -212,7 +210,6 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
         assert np.array_equal(runs[name].values[:, 0], runs[name].values[:, 1], equal_nan=True)
         assert np.isnan(runs[name].values[2]).all()
     cycle = friso.check(locked)["given"].judgement.cycle
-    assert cycle is not None
     alone = (cycle.multiplier, cycle.amplitude, cycle.period)
     result = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
     assert result == pytest.approx(alone, rel=1e-9)
