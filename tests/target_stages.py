@@ -1,7 +1,5 @@
 """Stages whose controllers leave friso in tests: five controllers on three machines."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from book import CONTROLLERS as CONTROLLERS

@@ -1,7 +1,5 @@
 """Gains and limits in amperes: of a stage that says what an ampere exerts, and of one that does not."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

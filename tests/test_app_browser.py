@@ -1,7 +1,5 @@
 """`friso app` in a real browser, on the thesis rig: journeys of a user, each in a page of its own that begins anew."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Test what a check shows: its figures, sentences, table and page, on made-up cases."""
 
-from __future__ import annotations
-
 import base64
 import re
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """The criteria on hunting: words that exclude each other and leave nothing out, in batches and alone, mirrored, and
 the thesis's peak count against scipy."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """Test `friso identify` as a user runs it: what it writes, says, predicts and refuses."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Experiments in time: known truth from the simulator and from a twin of one mass, and what a record cannot show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """From estimates to a stage: how they are combined, which the stage file takes, and how its keys are related."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs of moves: simulated machines whose truth is known, and the EMPS record with what it cannot show."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

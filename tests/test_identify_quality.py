@@ -1,7 +1,5 @@
 """Quality of an identification: intervals that are never empty, noise, model error, and messages on a bad log."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Sequence

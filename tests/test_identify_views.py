@@ -1,7 +1,5 @@
 """What `friso identify` says, writes and draws, on invented results: no engine and no fit is needed."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

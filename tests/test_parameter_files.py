@@ -1,7 +1,5 @@
 """Parameter files of drives: to stages by the formulas of their firmware, and back; and files that are refused."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

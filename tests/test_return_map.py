@@ -1,7 +1,5 @@
 """Hunting by the return map: known maps, the thesis rig compared with the search, and results that are no map."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

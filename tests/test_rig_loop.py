@@ -1,7 +1,5 @@
 """The loop closed: what the rig logs of a drawn machine comes back from files as a stage that holds the truth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

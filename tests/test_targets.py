@@ -1,7 +1,5 @@
 """Controllers that leave friso: every target is compiled or executed, and reproduces friso's run as built."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
