@@ -44,35 +44,11 @@ def machines() -> Iterator[tuple[str, Stage, Goal]]:
     yield "cascade", cascade, Goal(bandwidth_limit=40.0)
     yield "ADRC", locked.replace({"controller": {"kind": "adrc", "bandwidth": "3 Hz"}}), goal
     yield "ball screw", load(ROOT / "examples" / "ball_screw_axis.toml"), Goal(bandwidth_limit=40.0)
-    yield "rotary", Stage(**ROTARY), Goal(within=1e-5, bandwidth_limit=LIMIT)
+    yield "rotary", load(Path(__file__).with_suffix(".toml")), Goal(within=1e-5, bandwidth_limit=LIMIT)
     yield "vertical", locked.replace({"bias": {"stage": "-5 N"}}), goal
     gms = load(ROOT / "examples" / "thesis_rig_gms.toml").replace({"joint.locked": True})
     yield "GMS", gms, goal
     yield "force limit", locked.replace({"controller.force_limit": "60 N", "motion.acceleration": "25 m/s^2"}), goal
-
-
-ROTARY: dict[str, Any] = {
-    "axis": {"kind": "rotary"},
-    "masses": {"stage": "0.02 kg*m^2"},
-    "friction": {
-        "model": "lugre",
-        "static": "0.6 N*m",
-        "coulomb": "0.3 N*m",
-        "stribeck_velocity": "0.01 rad/s",
-        "stribeck_exponent": 2,
-        "bristle_stiffness": "2000 N*m/rad",
-        "bristle_damping": "5 N*m*s/rad",
-        "viscous": "0.02 N*m*s/rad",
-    },
-    "controller": {"kind": "pid", "crossover": "8 Hz", "alpha": 0.1, "beta": 2},
-    "motion": {
-        "kind": "there_and_back",
-        "acceleration": "50 rad/s^2",
-        "acceleration_time": "0.1 s",
-        "return_at": "3 s",
-        "duration": "10 s",
-    },
-}
 
 
 def tuned(stage: Stage, goal: Goal) -> list[dict[str, Any]]:
