@@ -6,8 +6,6 @@ machine and move goes to FILE as one line of JSON, so that a run may be continue
 at the end. `--only NAME ...` chooses machines, `--machines N` sets how many are tried.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Mapping
 from itertools import pairwise

@@ -3,8 +3,6 @@
 ``python -m benchmarks.log_variants`` prints the table of docs/evidence/logs.md.
 """
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import json

@@ -1,7 +1,5 @@
 """Compare friso's cycles, multipliers and bifurcations with those of SciPy (`orbits.py`)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -3,8 +3,6 @@
 LuGre's bristles creep; elasto-plastic ones do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

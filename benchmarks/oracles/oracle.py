@@ -1,7 +1,5 @@
 """Define an oracle: a fact with its source, and friso's answers beside those of others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Compare with the servo of the LuGre paper, which hunts only with its integral gain."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 

@@ -11,8 +11,6 @@ statements are from
 - Ruderman, arXiv 2311.03724 and 2006.08977: with Coulomb friction alone there is none, but stops ever closer by.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

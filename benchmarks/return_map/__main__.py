@@ -6,8 +6,6 @@ line each, and a run continues where one was stopped. `--table` writes the page 
 alone](return-map.md).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

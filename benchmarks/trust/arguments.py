@@ -4,8 +4,6 @@ They are of other types, empty, thousands of characters long, or out of range. T
 clear message with nothing written. Nothing is computed.
 """
 
-from __future__ import annotations
-
 import inspect
 import random
 import sys

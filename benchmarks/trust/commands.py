@@ -3,8 +3,6 @@
 They are killed, interrupted, short of disk, run two at once, or lose their workers.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import shutil
