@@ -8,7 +8,7 @@ from book import BOOK, KNOWN, knowing
 
 import friso
 from friso.equations.structure import structure
-from friso.hunting import find_attractors, find_swings, hunting, judge_many
+from friso.hunting import Ensemble, find_attractors, find_swings, hunting, judge_many, stuck
 
 
 def groups() -> dict[str, list[str]]:
@@ -65,6 +65,19 @@ def test_jumps_swing_on(name: str, rtol: float) -> None:
     response = friso.simulate(BOOK[name].replace({"motion": motion}), rtol=rtol, sample_time=period / 400)
     late = response.position.sel(time=slice(57 * period, None))
     assert np.ptp(late.to_numpy()) / 2 == pytest.approx(amplitude, rel=0.02)
+
+
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize("name", [*reversed(knowing("edge"))])
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+def test_edges_by_brute_force(name: str, rtol: float) -> None:
+    edge = KNOWN[name]["edge"]
+    starts = np.geomspace(*edge["stuck"])
+    for side, hunts in (("hunts", True), ("rests", False)):
+        flat = BOOK[name].replace({"controller.crossover": edge[side]}).flat()
+        several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
+        results = several.run(stuck(several, starts), np.full(len(starts), float(edge["after"])), rtol, window=0.9)
+        assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
 
 
 @pytest.mark.parametrize("name", knowing("extremes"))
