@@ -184,9 +184,9 @@ def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
 # ---------------------------------------------------------------- the peak count
 
 
-def sampled_peaks(values: np.ndarray) -> list[float]:
+def sampled_peaks(values: np.ndarray, prominence: float | None = None) -> list[float]:
     """Times of the counted peaks of samples by scipy: maxima late and tall, of which the tallest are kept first."""
-    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1))
+    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=prominence)
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
@@ -208,15 +208,6 @@ def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float
     assert times[marked].tolist() == sampled_peaks(values)
 
 
-def prominent_peaks(values: np.ndarray) -> int:
-    """Counted peaks of samples by scipy, of maxima alone that stand out by `LEAST_VALLEY_DEPTH`."""
-    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=LEAST_VALLEY_DEPTH)
-    spikes = np.zeros(len(values))
-    late = maxima[TIME[maxima] >= COUNTED_AFTER]
-    spikes[late] = values[late]
-    return len(find_peaks(spikes, distance=round(LEAST_PEAK_SEPARATION / STEP))[0])
-
-
 def test_where_a_trace_ends_is_no_peak() -> None:
     """Traces that end on their way up, smooth or with noise, have the peaks that scipy finds; a drift has none."""
     random = np.random.default_rng(5)
@@ -225,7 +216,7 @@ def test_where_a_trace_ends_is_no_peak() -> None:
     drifts = np.array([1e-5 * TIME, 2e-4 - 1e-6 * TIME, 2e-4 + 0 * TIME])
     runs = np.vstack([swings, swings + noise, drifts, drifts + noise[:3]])
     counts = peaks_in_traces(TIME, runs)
-    assert counts.tolist() == [prominent_peaks(values) for values in runs]
+    assert counts.tolist() == [len(sampled_peaks(values, LEAST_VALLEY_DEPTH)) for values in runs]
     assert np.any(swings[:, -1] > np.maximum(swings[:, -2], COUNTED_ABOVE))
     assert counts[24:].tolist() == [0] * 6
 
