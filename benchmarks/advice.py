@@ -8,8 +8,6 @@ that meets the goal. That speed is found by brute search, in steps of `STEP`. Ke
 twice.
 """
 
-from __future__ import annotations
-
 import argparse
 import tomllib
 from collections.abc import Iterator, Mapping

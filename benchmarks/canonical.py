@@ -7,8 +7,6 @@ solver. Evidence states the revision of the equations it was computed with (`fri
 set of numbers.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Mapping

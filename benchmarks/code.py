@@ -5,8 +5,6 @@ and blank lines do not count. Prose is docstrings and comments. The anchors, pyt
 installed, with the same rules.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import io

@@ -4,8 +4,6 @@ Comments, docstrings, sentences, annotations, imports and the names that a modul
 so that a change of words leaves the digest unchanged. Another number, condition or called function changes it.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence

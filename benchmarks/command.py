@@ -3,8 +3,6 @@
 It prints the times of the README's commands, each in a fresh process.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

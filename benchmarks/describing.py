@@ -3,8 +3,6 @@
 It takes three minutes.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

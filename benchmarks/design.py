@@ -4,8 +4,6 @@ It times the closed forms for one geometry and for a million at once, and the be
 design run with its verification is timed, step by step, once its kernels are compiled.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from dataclasses import replace

@@ -9,8 +9,6 @@ Documents that state a finding are listed if the value has changed: they are edi
 differ, it begins a new revision: every entry is then older than the equations.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shlex

@@ -6,8 +6,6 @@ one fails. A fault is one changed operator, comparison, condition or number in a
 with a seed. Tests run in a copy of this checkout, in one process.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

@@ -7,8 +7,6 @@ family it prints how many logs were noticed (a doubt was raised, or the log refu
 first, how many reported values hold the truth, and how many were still reported. Sound logs show false alarms.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field

@@ -8,8 +8,6 @@ told, of the true machine with that bandwidth. With `--kept`, results are append
 computed again.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tempfile

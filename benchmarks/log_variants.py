@@ -3,8 +3,6 @@
 ``python -m benchmarks.log_variants`` prints the table of docs/evidence/logs.md.
 """
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import json
@@ -25,7 +23,6 @@ STEP = 1e-3
 TIME = STEP * np.arange(3000)
 FORCE = 12 * np.sin(2 * np.pi * 1.3 * TIME) + 7 * np.sin(2 * np.pi * 0.37 * TIME)
 POSITION = 1e-3 * np.round(1e7 * np.cumsum(np.cumsum(FORCE / 5)) * STEP**2) / 1e4 + 1.5
-TRUTH = {"position": POSITION, "force": FORCE}
 HEADS = ("time [s]", "position [mm]", "force [N]")
 RIGHT, ASKS, REFUSED, MISREAD = "right", "asks", "refused", "MISREAD"
 

@@ -4,8 +4,6 @@ Run by `python -m benchmarks.maps [--only maps|large|growth|overhead]`. Parts ar
 10^6 runs; the cost per run from 10^3 to 10^6 runs; and what a block costs besides its runs.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import statistics

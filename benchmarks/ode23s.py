@@ -6,8 +6,6 @@ Simulink's 1e-6 in every state. The equations of the rig are written here by han
 2: nothing of friso's equations or engine is used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

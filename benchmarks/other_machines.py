@@ -7,8 +7,6 @@ qemu-user-static, with binfmt_misc mounted. An emulated processor is slow: the c
 and 6 s here.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

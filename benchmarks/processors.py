@@ -9,8 +9,6 @@ numbers of the answers are compared. Slow questions get fewer stages. `--kept FO
 processor, one file for a question and stage, so that a run continues where one was stopped.
 """
 
-from __future__ import annotations
-
 import argparse
 import base64
 import json

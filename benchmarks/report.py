@@ -1,7 +1,5 @@
 """Print tables of text, and the goals with what was measured."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

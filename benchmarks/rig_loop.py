@@ -13,8 +13,6 @@ friction are means along the stretches where its cart went; in the stage file an
 the travel of the machine's own motion. All other true values are the machine's own.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

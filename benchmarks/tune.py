@@ -10,8 +10,6 @@ fresh machines, and the fraction that meets the goal is counted. `--thesis` tune
 they help less at some step sizes.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from itertools import product

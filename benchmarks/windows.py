@@ -8,8 +8,6 @@ above that is gone 6 % to either side lies in a window narrower than the steps o
 not speak (docs/hunting.md); it is counted by itself.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

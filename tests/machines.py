@@ -3,8 +3,6 @@
 Ranges are wide but realistic, about the thesis's rig (Table 2) and smaller and larger stages like it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

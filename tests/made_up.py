@@ -1,7 +1,5 @@
 """Cases of a check and figures that are made up: looking at plots needs no engine."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass, field, replace

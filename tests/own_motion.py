@@ -1,7 +1,5 @@
 """A motion that is declared outside friso: a polynomial and a tone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 

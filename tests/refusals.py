@@ -1,7 +1,5 @@
 """Check refused inputs by key: every refusal says what was given, and what was expected."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -5,8 +5,6 @@ friction are those of machines.py. Further sizes of the thesis's rig are scaled 
 examples/thesis_drive.toml, so that all share one set of kernels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

@@ -5,8 +5,6 @@ versions and numerical errors are masked. Numbers are compared to 2 %, or to the
 length of lines of a table are not compared.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Linear active disturbance rejection, which friso has as a transfer function, against the observer written by hand."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

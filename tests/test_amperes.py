@@ -1,12 +1,11 @@
 """Gains and limits in amperes: of a stage that says what an ampere exerts, and of one that does not."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
 import numpy as np
 import pytest
+from book import BOOK
 
 import friso
 from friso.axis import KINDS
@@ -16,52 +15,9 @@ from friso.hunting import hunting as hunting_of
 from friso.stage import Stage
 from friso.studies.axes import SweptAxis, read_axis
 
-LINEAR = {
-    "masses": {"stage": "20 kg"},
-    "controller": {
-        "kind": "pid",
-        "kp": "100 A/mm",
-        "ki": "400 A/(m*s)",
-        "kd": "2 A*s/mm",
-        "tau": "1 ms",
-        "viscous_feedforward": "3 A*s/m",
-        "acceleration_feedforward": "0.4 A*s^2/m",
-        "coulomb_feedforward": "0.2 A",
-        "force_limit": "4 A",
-        "integral_limit": "500 mA",
-    },
-    "actuator": {"motor_constant": "50 N/A"},
-    "motion": {"kind": "hold", "duration": "1 s"},
-}
-ROTARY = {
-    "axis": {"kind": "rotary"},
-    "masses": {"stage": "0.02 kg*m^2"},
-    "controller": {
-        "kind": "cascade",
-        "kv": "25 1/s",
-        "kp": "2 A*s/rad",
-        "velocity_integral_time": "10 ms",
-        "acceleration_feedforward": "0.4 A*s^2/rad",
-        "force_limit": "4 A",
-    },
-    "actuator": {"motor_constant": "5 N*m/A"},
-    "motion": {"kind": "hold", "duration": "1 s"},
-}
-IN_VOLTS = {
-    "masses": {"stage": "1.7 kg"},
-    "friction": {
-        **{"model": "lugre", "static": "3 N", "coulomb": "1 N", "stribeck_velocity": "1.6 mm/s"},
-        **{"stribeck_exponent": 2, "bristle_stiffness": "1e5 N/m", "bristle_damping": "316 N*s/m"},
-        "viscous": "0.5 N*s/m",
-    },
-    "controller": {
-        **{"kind": "pid", "kp": "0.4 V/mm", "ki": "4 V/(mm*s)", "kd": "10 mV*s/mm", "derivative_on": "measurement"},
-        "force_limit": "100 %",
-    },
-    "actuator": {"motor_constant": "10 N/A", "resistance": "2 ohm", "supply": "24 V", "full_pwm": 1000},
-    "drive": {"sample_time": "90 us", "encoder_resolution": "1 um"},
-    "motion": {"kind": "release", "displacement": "2 mm", "duration": "2 s"},
-}
+LINEAR, ROTARY, IN_VOLTS = (
+    BOOK[name].as_written() for name in ("linear axis in amperes", "rotary axis in amperes", "in volts")
+)
 WITHOUT_DRIVE = {name: table for name, table in IN_VOLTS.items() if name != "drive"}
 IN_NEWTONS = {
     "kp": 5e6,

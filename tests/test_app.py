@@ -1,7 +1,5 @@
 """Test the server of `friso app`: whom it lets in, what it accepts, and that its answers are friso's."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import contextlib

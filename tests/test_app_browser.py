@@ -1,7 +1,5 @@
 """`friso app` in a real browser, on the thesis rig: journeys of a user, each in a page of its own that begins anew."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -207,9 +205,7 @@ def serving(port: str = "0") -> Iterator[tuple[str, str]]:
     command = [sys.executable, "-c", SERVER, "app", str(RIG), "--no-browser", "--port", port]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
-            assert server.stdout is not None
             address = re.search(r"(http://\S+/)\?\S+", server.stdout.readline())
-            assert address is not None
             yield address[0], address[1]
         finally:
             server.terminate()

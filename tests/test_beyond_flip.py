@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beyond_flip import STEEP
+from book import BOOK
 
 from friso.equations.bandwidth import faster
 from friso.hunting import Ensemble, KeyRange, Space, diagram, find_attractors, stuck
@@ -15,7 +15,7 @@ FLIP = 0.135006
 @pytest.mark.slow
 def test_what_attracts_beyond_a_flip() -> None:
     """Irregular swings beside the cycle, and others, attract to more than 1 % beyond its end."""
-    flat = faster(STEEP.flat(), FLIP * np.array([0.99, 1.0125, 1.03]))
+    flat = faster(BOOK["steep"].flat(), FLIP * np.array([0.99, 1.0125, 1.03]))
     assert find_attractors(flat, 3).attracts.tolist() == [True, True, False]
 
 
@@ -24,7 +24,7 @@ def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
     """For 300 periods, 0.1 and 1.25 % above."""
     distances = np.linspace(112e-6, 128e-6, 24)
     for share in (1.001, 1.0125):
-        stages = Ensemble.held(faster(STEEP.flat(), np.full(24, share * FLIP)), 24)
+        stages = Ensemble.held(faster(BOOK["steep"].flat(), np.full(24, share * FLIP)), 24)
         results = stages.run(stuck(stages, distances), np.full(24, 26 * 300.0), 1e-8, window=0.95)
         assert np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 200e-6)
 

@@ -1,7 +1,5 @@
 """Blocks of controllers, by themselves: steady motions last, and integrators rest at limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from beyond_flip import CREEPING
+from book import BOOK
 from variants import VARIANTS
 
 import friso
@@ -22,8 +22,6 @@ from friso.hunting import (
 from friso.hunting.continuation.locate import turn
 from friso.stage import Stage
 from friso.studies.boundary import stability_changes
-
-pytestmark = pytest.mark.xdist_group("rigid")
 
 RIGID = VARIANTS["rigid"]
 AT_8_HZ = RIGID.replace({"controller.crossover": "8 Hz"})
@@ -220,7 +218,9 @@ def test_a_logarithmic_range_finds_the_same_flip() -> None:
 @pytest.mark.slow
 def test_where_hunting_ends_beyond_a_curve_it_is_searched_on() -> None:
     """Beyond the flip that is drawn, an asymmetric cycle attracts on: a thorough search agrees on both sides."""
-    space = Space.of(CREEPING, [KeyRange("controller.crossover", 11.9, 13.5), KeyRange("friction.static", 28.6, 29.2)])
+    space = Space.of(
+        BOOK["creeping"], [KeyRange("controller.crossover", 11.9, 13.5), KeyRange("friction.static", 28.6, 29.2)]
+    )
     for hunts, places in zip((True, False), beside(plane(space, nodes=3), 0.02), strict=True):
         for place in places:
             assert bool(find_swings(space.stages(place[None]).flat)) == hunts

@@ -43,8 +43,6 @@ RIG, STICK_SLIP = EXAMPLES / "thesis_rig.toml", EXAMPLES / "lugre_stick_slip.tom
 LOCKED = ("--set", "joint.locked=true")
 CROSSOVER = ("--x", "controller.crossover=6 Hz..15 Hz")
 
-pytestmark = pytest.mark.xdist_group("locked")
-
 
 def boundary(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.CompletedProcess[str]:
     """Run the command in a folder."""
@@ -260,16 +258,13 @@ def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane,
     rows, ends = [[1, 1, 1], [0, 0, 0], [0, 0, 0]], {0: 0.25, 1: 0.25, 2: 0.3}
     plane = _plane(rows, [*range(9)], ends)
     edge = plane_edge(plane)
-    assert edge is not None
     assert (edge.along, edge.below) == (0, True)
     assert edge.low == pytest.approx([1.25e-3, 1.25e-3, 1.3e-3])
     assert edge.low.tolist() == edge.high.tolist()
     snapshots.check("boundary", "along one key", conclusion(plane, KEYS))
     seen = plane_edge(_plane(rows, [*range(9)], ends, "seen"))
-    assert seen is not None
     assert seen.high == pytest.approx([1.26e-3, 1.26e-3, 1.31e-3])
     along_second = plane_edge(_plane([[1, 0, 0]] * 3, [*range(9)], {}))
-    assert along_second is not None
     assert along_second.along == 1
     for unclear in ([[1, 0, 1], [0, 0, 0], [0, 0, 1]], [[1, 1, 1], [0, 0, 0], [0, np.nan, 0]]):
         assert plane_edge(_plane(unclear, [*range(9)], ends)) is None

@@ -12,6 +12,7 @@ from variants import (
     elasto_plastic,
     gains,
     gms,
+    maxwell,
     release,
     rolling,
     stage,
@@ -34,8 +35,6 @@ from friso.virtual_rig.run import failures, run
 from friso.virtual_rig.task import own_motion
 from friso_thesis.studies.describing.function import describing
 from friso_thesis.studies.describing.multi import OneStateLaw
-
-pytestmark = pytest.mark.xdist_group("bristle_laws")
 
 LAWS = {"elasto_plastic": elasto_plastic(), "rolling": rolling()}
 
@@ -124,7 +123,7 @@ def test_an_active_law_gives_energy_back_somewhere(law: str) -> None:
     assert force * 0.05 - 1e5 * 2.99e-5 * rate < 0
 
 
-@pytest.mark.parametrize("friction", [elasto_plastic(), gms(damping=MICRO_DAMPING)])
+@pytest.mark.parametrize("friction", [elasto_plastic(), gms(damping=MICRO_DAMPING), maxwell()])
 def test_the_drive_as_built(friction: str) -> None:
     """A quick drive without imperfections moves the stage as the continuous loop does."""
     moves = stage(there_and_back("0.4 s", "0.15 s", "1 m/s^2"), friction=friction, controller=gains(**FULL, tau=1e-3))
@@ -137,18 +136,25 @@ def test_the_drive_as_built(friction: str) -> None:
     assert np.abs(position - response.position.values[: len(position)]).max() < 0.05 * np.ptp(position)
 
 
-def test_harmonic_balance_refuses_kinks_of_its_own() -> None:
-    with pytest.raises(InputError, match="kinks of its own"):
-        OneStateLaw.of(HUNTING["elasto_plastic"].flat())
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("rigid, elasto-plastic", "kinks of its own"), ("rigid, Maxwell slip, PID", "modes that remember")],
+)
+def test_harmonic_balance_refuses_laws_of_more_than_a_state(name: str, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        OneStateLaw.of(VARIANTS[name].flat())
 
 
 def test_what_of_them_is_fitted() -> None:
     """Rolling friction is fitted in the keys of LuGre, with its exponent as given.
 
-    Elasto-plastic friction is refused, not ignored: its stiffness is bounded by its break-away deflection.
+    Elasto-plastic friction is refused, not ignored: its stiffness is bounded by its break-away deflection. So is a law
+    from outside friso.
     """
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
     names = {item.name for item in fit_parameters(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
     assert {"friction.bristle_stiffness", "friction.bristle_damping", "friction.stribeck_velocity"} <= names
-    with pytest.raises(InputError, match="elasto_plastic"):
-        fit_parameters(HUNTING["elasto_plastic"].flat(), levels, 0.1, 0.1, True)
+    for law, name in (("elasto_plastic", "rigid, elasto-plastic"), ("maxwell_slip", "rigid, Maxwell slip, PID")):
+        with pytest.raises(InputError, match=law) as refused:
+            fit_parameters(VARIANTS[name].flat(), levels, 0.1, 0.1, True)
+        assert all(known in str(refused.value) for known in ("lugre", "dahl", "stribeck", "rolling"))

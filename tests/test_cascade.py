@@ -1,8 +1,6 @@
 """Position loop over velocity loop: against models by hand, python-control and difference equations, and through the
 commands."""
 
-from __future__ import annotations
-
 import tomllib
 from itertools import pairwise
 from pathlib import Path

@@ -17,8 +17,6 @@ from friso.studies.sweep import sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 @pytest.fixture(scope="module")
 def checked(rig: Stage) -> CheckAnswer:
@@ -64,7 +62,6 @@ def test_measures_agree_with_the_trace(rig: Stage) -> None:
     """The statistics gathered in the kernel against the samples of the dense output."""
     for case in friso.check(rig).traced.values():
         trace = case.trace
-        assert trace is not None
         off = np.abs(trace.position - trace.reference).values
         time, late = trace.time.values, trace.time.values >= 15
         deviation = (trace.position - trace.reference).values[late]
@@ -138,11 +135,8 @@ def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> No
 def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
     """references.md, section 2: the locked rig's multiplier passes -1 near 9.7 Hz."""
     locked, free = checked["locked"].judgement, checked["free"].judgement
-    assert locked.margin is not None
-    assert free.margin is not None
     assert locked.margin.crossover == pytest.approx(9.75, rel=2e-3)
     assert free.margin.crossover == pytest.approx(5.60, rel=5e-3)
-    assert locked.displacement is not None
     assert locked.displacement.smallest == pytest.approx(0.2e-3, rel=0.02)
 
 
@@ -157,7 +151,6 @@ def test_verdicts_by_the_cycle(rig: Stage, crossover: str, locked: bool, verdict
     stage = rig.replace({"controller.crossover": crossover, "joint.locked": locked})
     judgement = check_given(stage, 1e-6).judgement
     assert judgement.verdict == verdict
-    assert judgement.cycle is not None
     assert judgement.cycle.attracts == (verdict == "bistable")
 
 

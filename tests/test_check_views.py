@@ -1,7 +1,5 @@
 """Test what a check shows: its figures, sentences, table and page, on made-up cases."""
 
-from __future__ import annotations
-
 import base64
 import re
 from dataclasses import replace
@@ -102,13 +100,11 @@ def test_what_a_stage_lacks_has_no_panel():
     assert [figure.name for figure in check_figures({"given": case})] == ["settled", "overview"]
     assert "The friction" not in check_html({"given": case})
     case = fake_case(hunting=True)
-    assert case.trace is not None
     case.trace["force_i"][:] = 0.0
     assert [line.label for line in figure_of("shares", {"given": case}).panels[0].series] == ["P", "D", "total"]
     near, far = (fake_case(hunting=True, stage=fake_stage(force_limit=bound)) for bound in (6.0, 200.0))
     panel = figure_of("overview", {"given": near}).panels[1]
     assert panel.limits[0].values == (-6.0, 6.0)
-    assert panel.y.limits is not None
     assert panel.y.limits[1] > 6.0
     assert figure_of("overview", {"given": far}).panels[1].limits == ()
 
@@ -170,7 +166,6 @@ def test_return_map_with_the_swings_of_this_motion():
 
 def test_ringing_does_not_count_as_a_swing():
     case = fake_case(hunting=True)
-    assert case.trace is not None
     ringing = np.array([4e-4, 4.2e-4, -1e-4, -3e-4, -2e-4, 1e-4])
     turns = {"turning_time": ("turning_point", np.arange(6.0) + 1), "turning_deviation": ("turning_point", ringing)}
     case = replace(case, trace=case.trace.drop_vars(list(turns)).assign(turns))

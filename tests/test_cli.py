@@ -23,8 +23,6 @@ from friso.progress import WORK_CLOCK
 ROOT = Path(__file__).parent.parent
 RIG, STICK_SLIP = ROOT / "examples" / "thesis_rig.toml", ROOT / "examples" / "lugre_stick_slip.toml"
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     return friso_inside(cwd or ROOT, *arguments)

@@ -72,7 +72,6 @@ def run(
     threads = options.pop("threads", None)
     chosen = RunOptions(**{"rtol": 1e-11, "interval": every * TIME, **options})
     batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
-    assert chosen.interval is not None
     results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, shape.sample_size)
     run_batch(shape, batch, options_of(chosen), results, threads)
     return shape, results

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from book import BOOK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from inside import friso_inside
@@ -84,20 +85,7 @@ def with_measures(result: Compared, **measured: Any) -> Compared:
 @pytest.fixture
 def screw() -> Stage:
     """A stage whose friction is at the motor, which swings slowly."""
-    return Stage(
-        masses={"stage": "9 kg"},
-        transmission={"mass": "6 kg", "stiffness": "60 N/um", "damping": "500 N*s/m", "backlash": "0 um"},
-        encoder={"position": "load", "velocity": "load"},
-        motor_friction={
-            **{"model": "lugre", "static": "16 N", "coulomb": "8 N", "stribeck_velocity": "2 mm/s"},
-            **{"stribeck_exponent": 2, "bristle_stiffness": "0.8 N/um", "bristle_damping": "1500 N*s/m"},
-            "viscous": "12 N*s/m",
-        },
-        controller={"kind": "pid", "crossover": "6 Hz", "alpha": 0.1, "beta": 2},
-        drive={"sample_time": "500 us", "delay": "0 us"},
-        motion={"kind": "there_and_back", "acceleration": "8 m/s^2", "acceleration_time": "50 ms", "return_at": "1.5 s",
-                "duration": "6 s"},
-    )  # fmt: skip
+    return BOOK["screw that swings slowly"]
 
 
 @pytest.mark.parametrize("duration", ["6 s", "3.4 s"])

@@ -107,11 +107,8 @@ def test_a_stage_without_friction_hunts_from_a_level_on(hunting: Stage) -> None:
     assert friction_levels(hunting) is None
     assert friction_levels(friso.load(friso.example("ball_screw_axis")).replace({"friction": None})) is None
     levels = friction_levels(hunting.replace({"friction": None, "controller.crossover": "4 Hz"}))
-    assert levels is not None
     assert levels.shares[0] < 0.1
     ends = levels.ends(0.5)
-    assert ends is not None
     assert ends[0] < 17
     faster = friction_levels(hunting.replace({"friction": None, "controller.crossover": "40 Hz"}))
-    assert faster is not None
     assert (faster.shares <= levels.shares + 0.1).all()

@@ -1,8 +1,6 @@
 """The criteria on hunting: words that exclude each other and leave nothing out, in batches and alone, mirrored, and
 the thesis's peak count against scipy."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
@@ -73,7 +71,6 @@ def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
-@pytest.mark.xdist_group("rig")
 def test_check_is_the_batch_of_one(rig: Stage) -> None:
     """Four verdicts of stages alone, and the same stages in one batch."""
     crossovers = np.array([8.0, 10.0, 12.0, 4.0])
@@ -168,7 +165,6 @@ def test_rest_may_be_asked_for_some_time() -> None:
     assert [outcomes(end, REST_BAND, hold)[0] for hold in (0.0, 1.9, 2.1)] == ["rests", "rests", "creeps"]
 
 
-@pytest.mark.xdist_group("rig")
 def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
     """The statistics and turning points of the kernel against samples of the same runs; each alone and together."""
     crossovers = np.array([2.0, 5.0, 8.0, 9.5, 12.0, 16.0])
@@ -188,9 +184,9 @@ def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
 # ---------------------------------------------------------------- the peak count
 
 
-def sampled_peaks(values: np.ndarray) -> list[float]:
+def sampled_peaks(values: np.ndarray, prominence: float | None = None) -> list[float]:
     """Times of the counted peaks of samples by scipy: maxima late and tall, of which the tallest are kept first."""
-    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1))
+    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=prominence)
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
@@ -212,15 +208,6 @@ def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float
     assert times[marked].tolist() == sampled_peaks(values)
 
 
-def prominent_peaks(values: np.ndarray) -> int:
-    """Counted peaks of samples by scipy, of maxima alone that stand out by `LEAST_VALLEY_DEPTH`."""
-    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=LEAST_VALLEY_DEPTH)
-    spikes = np.zeros(len(values))
-    late = maxima[TIME[maxima] >= COUNTED_AFTER]
-    spikes[late] = values[late]
-    return len(find_peaks(spikes, distance=round(LEAST_PEAK_SEPARATION / STEP))[0])
-
-
 def test_where_a_trace_ends_is_no_peak() -> None:
     """Traces that end on their way up, smooth or with noise, have the peaks that scipy finds; a drift has none."""
     random = np.random.default_rng(5)
@@ -229,7 +216,7 @@ def test_where_a_trace_ends_is_no_peak() -> None:
     drifts = np.array([1e-5 * TIME, 2e-4 - 1e-6 * TIME, 2e-4 + 0 * TIME])
     runs = np.vstack([swings, swings + noise, drifts, drifts + noise[:3]])
     counts = peaks_in_traces(TIME, runs)
-    assert counts.tolist() == [prominent_peaks(values) for values in runs]
+    assert counts.tolist() == [len(sampled_peaks(values, LEAST_VALLEY_DEPTH)) for values in runs]
     assert np.any(swings[:, -1] > np.maximum(swings[:, -2], COUNTED_ABOVE))
     assert counts[24:].tolist() == [0] * 6
 

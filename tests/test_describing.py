@@ -53,8 +53,6 @@ STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
 """Laws of which all or a part follows small motions as a spring."""
 
 STEADY = settings(max_examples=25)
-DESCRIBING = pytest.mark.xdist_group("describing")
-pytestmark = DESCRIBING
 
 
 def rigid(friction: str) -> Stage:

@@ -354,7 +354,6 @@ def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> N
     (panel,) = figure.panels
     (field,) = panel.maps
     assert field.z[0, 0] == 50.0
-    assert field.codes is not None
     assert (field.codes[1, 1], field.codes[2, 2]) == (1.0, 0.0)
     assert np.isnan(field.codes[0, 0])
     assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (designed.controller.crossover, 1.0)
@@ -365,7 +364,6 @@ def test_window_with_edges_beyond_the_search(designed: Design) -> None:
     endless = replace(designed.without, edges=np.where(np.arange(len(designed.without.edges)) == 0, np.inf, 5.0))
     (panel,) = _figures(replace(designed, without=endless))["design_window"].panels
     assert panel.y.words == ("without", "isolator", "margin", "leaves", "machine")
-    assert panel.x.limits is not None
     reach = [band.x.max() for band in panel.bands if band.low[0] < 0]
     assert reach == [panel.x.limits[1]]
     assert panel.series[0].x == pytest.approx([designed.controller.crossover] * 2)

@@ -95,7 +95,6 @@ def test_the_outline_of_a_specification_is_one(rig: friso.Stage) -> None:
     stage = rig.replace({"friction.static": "3 N +/- 0.5 N"})
     spec = read_spec(outline(stage))
     assert spec.limit == stage.flat()["controller.crossover"]
-    assert spec.friction.static is not None
     assert (spec.friction.static.low, spec.friction.static.high) == (2.5, 3.5)
     assert spec.moves.travel.high == pytest.approx(100 * 0.03**2)
     prepared(stage, spec)

@@ -24,11 +24,8 @@ from friso.studies.sweep import connected, run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
-pytestmark = [
-    pytest.mark.xdist_group("rig"),
-    # distributed's own: sockets that are closed by the garbage collector
-    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
-]
+# distributed's own: sockets that are closed by the garbage collector
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Figures as data and their two renderers."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -137,7 +137,6 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
     units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
     gains = gains_of(read.stage, units | BACK.get(kind, {}), kind)
     back = gains.parameters
-    assert back is not None
     assert not [key for key in gains.not_held if any(part in key for part in CHANGED)]
     numbers = [f"{value:.12g}" for value in back.values()]
     text = FORMATS[kind].text(back)
@@ -178,7 +177,6 @@ def test_the_settings_of_a_stage_that_was_changed_are_those_written_back(tmp_pat
         stage = stage.replace({f"controller.{key}": value for key, value in keys.items()})
         units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
         back = gains_of(stage, units | BACK.get(kind, {}), kind).parameters
-        assert back is not None
         assert {name: back[name] for name in parameters} == pytest.approx(parameters, rel=1e-9)
 
 
@@ -221,7 +219,6 @@ def test_gains_per_cycle_of_a_stage_without_a_drive_need_the_cycle(tmp_path: Pat
     with pytest.raises(InputError, match=r"--set drive\.sample_time="):
         gains_of(stage.replace({"drive": None}), answers, "ecmc")
     back = gains_of(stage.replace({"drive": {"sample_time": "2 ms"}}), answers, "ecmc").parameters
-    assert back is not None
     assert back["Ki"] == pytest.approx(2 * 0.05)
 
 

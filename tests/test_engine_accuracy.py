@@ -24,7 +24,6 @@ from friso.stage import Stage
 
 LINEAR = VARIANTS["rigid, no friction section"]
 MOVE = {"motion.return_at": 0.1, "motion.duration": 0.3}
-ALONE = pytest.mark.xdist_group("linear")
 
 
 def exact(flat: dict[str, Any], names: tuple[str, ...], times: np.ndarray) -> np.ndarray:
@@ -66,7 +65,6 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     return results, results.samples[0], exact(flat, shape.states, times)
 
 
-@ALONE
 def test_order_of_the_compiled_kernel() -> None:
     """Order 5 everywhere in the steps, over a move with corners (both step lengths divide the times between them)."""
     errors = []
@@ -76,7 +74,6 @@ def test_order_of_the_compiled_kernel() -> None:
     assert np.log2(errors[0] / errors[1]) == pytest.approx(5, abs=0.1)
 
 
-@ALONE
 def test_every_corner_is_a_step() -> None:
     """With the reference known, only the corner times decide the number of steps."""
     results, _, _ = fixed_steps(1.0, 0.3, MOVE)
@@ -85,7 +82,6 @@ def test_every_corner_is_a_step() -> None:
     assert results.statistics[0, 7] == 0.3
 
 
-@ALONE
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_samples_and_turning_points_are_as_good_as_the_steps(rtol: float) -> None:
     """Everywhere within some rtol of the size of the motion; a straight line between steps would miss by far."""
@@ -193,7 +189,6 @@ def test_a_reference_that_stands_still_is_no_measure_of_length(bias: float) -> N
     assert np.max(np.abs(ours - theirs)[:, shape.position]) < 1e-2 * length
 
 
-@ALONE
 @pytest.mark.parametrize("duration", [0.33, 0.43, 0.46])
 def test_the_last_sample_is_taken(duration: float) -> None:
     """The last sample is taken even if rounding puts the end of the run just before it."""
@@ -203,7 +198,6 @@ def test_the_last_sample_is_taken(duration: float) -> None:
     assert np.all(np.isfinite(runs.results.samples))
 
 
-@pytest.mark.xdist_group("rigid")
 def test_turning_points_against_a_tighter_run() -> None:
     """On a stretch with stops, at rtol 1e-6 they agree to about 1e-6 with those at 1e-11."""
     flat = VARIANTS["rigid"].replace({"motion": {"kind": "step", "size": "-2 mm", "duration": "8 s"}}).flat()

@@ -11,8 +11,6 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.structure import structure
 
-pytestmark = pytest.mark.xdist_group("rigid")
-
 RUNS = 83
 BASE = RunOptions(rtol=1e-5, interval=5e-3)
 Flat = dict[str, Any]

@@ -1,8 +1,6 @@
 """Kinds of experiment, experiments of the rig, formats of logs and pages that are each declared in one place, here, go
 all the way through friso."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import sys
@@ -204,7 +202,6 @@ from friso.interface.question import HUNTS, Question
 QUESTION = Question(__name__, 25, HUNTS, "hold rig.toml --force-limit '3 N'", details=True)
 """,
     "question": """
-from __future__ import annotations
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, ForceLike, StageLike, quantity_of, read_stage
 from friso.progress import Progress, silent

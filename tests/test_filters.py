@@ -1,7 +1,5 @@
 """Filters of a controller: in the stage file, in continuous time and as a drive carries them out."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Leaf springs by closed forms and by beams: published numbers, what physics demands of them, and each other."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 `python tests/test_flexure_shells.py` prints the errors of docs/evidence/flexure.md, on a finer mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

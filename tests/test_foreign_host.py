@@ -1,7 +1,5 @@
 """Test friso on Windows and on macOS, as far as possible without them (foreign_host/sitecustomize.py)."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -23,7 +23,6 @@ from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
 GROUND = ("cases", "component", "conditions", "friction")
-RIGID = pytest.mark.xdist_group("rigid")
 STEADY = settings(max_examples=25)
 
 
@@ -85,7 +84,6 @@ def friction_keys(**values: float) -> dict[str, float]:
     return {f"friction.{name}": value for name, value in values.items()}
 
 
-@RIGID
 @STEADY
 @given(
     st.floats(0.5, 5), st.floats(0.2, 1), st.floats(1e-4, 1e-2), st.floats(0, 1000), st.floats(2, 15), st.floats(0.5, 5)
@@ -110,7 +108,6 @@ def energy_loss(flat: dict[str, Any], samples: np.ndarray) -> np.ndarray:
     return np.array(losses)
 
 
-@RIGID
 @STEADY
 @given(st.floats(1, 4), st.floats(0.5, 1), st.floats(1, 300), st.floats(1.01, 2), st.floats(2, 15))
 def test_friction_creates_no_energy_where_it_is_passive(
@@ -142,7 +139,6 @@ def turns(results: Results) -> np.ndarray:
 CASES = given(st.floats(0.3, 3), st.floats(3, 12), st.floats(1.2, 4), st.floats(0.5, 1.1))
 
 
-@RIGID
 @STEADY
 @CASES
 def test_mirror(displacement: float, crossover: float, static: float, coulomb: float) -> None:
@@ -154,7 +150,6 @@ def test_mirror(displacement: float, crossover: float, static: float, coulomb: f
     assert one.statistics[0, 0] == pytest.approx(other.statistics[0, 0], rel=1e-6)  # as finely as steps are looked at
 
 
-@RIGID
 @STEADY
 @CASES
 def test_units(displacement: float, crossover: float, static: float, coulomb: float) -> None:

@@ -192,7 +192,6 @@ def test_of_a_stage_that_hunts_at_all_higher_bandwidths_the_lower_ones_alone_are
 ) -> None:
     def exhausted() -> SearchedBandwidths:
         allowed = current_allowance()
-        assert allowed is not None
         with suppress(Exhausted):
             allowed.exhaust()
         return replace(NOT_SOUGHT, to_the_top=to_the_top)

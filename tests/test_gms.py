@@ -16,8 +16,6 @@ from friso.hunting import Ensemble, find_cycles
 from friso.studies.laws import measure_friction
 from friso_thesis.studies.describing.function import describing
 
-pytestmark = pytest.mark.xdist_group("gms")
-
 STIFFNESS, SHARE = np.array([5e4, 3e4, 2e4]), np.array([0.2, 0.3, 0.5])
 
 FLAT_CURVE = gms(static="2 N", coulomb="2 N", viscous="0 N*s/m")

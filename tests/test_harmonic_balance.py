@@ -24,8 +24,6 @@ from friso_thesis.studies.describing.multi import (
 )
 from friso_thesis.studies.harmonic_balance import harmonic_balance
 
-pytestmark = pytest.mark.xdist_group("describing")
-
 GRID = (np.geomspace(1e-8, 1, 81), np.geomspace(1e-3, 1e3, 91))
 
 KP, KI, KD, MASS, COULOMB = 1000.0, 15_000.0, 20.0, 1.7, 1.0

@@ -1,11 +1,7 @@
 """The house: what stands where, so that the fifth example of a pattern goes where the first four are."""
 
 import ast
-import importlib
-import importlib.util
-import inspect
 import re
-from collections import defaultdict
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -17,12 +13,9 @@ import pytest
 import friso
 import friso_thesis
 from benchmarks.code import count
-from friso.interface.answer import Answer
-from friso.interface.question import QUESTIONS
 
 PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, friso_thesis))
 ROOT = Path(__file__).parents[1]
-GUIDE = ROOT / "CONTRIBUTING.md"
 
 KNOW_CONTROLLERS = (
     *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/controllers.py", "templates/"),
@@ -42,21 +35,6 @@ ABOUT_TUNING = (
 """Modules that import a form of the PID controller: the design method, the thesis and the guideline are about van
 Dijk's rules (Eq. 7, 8); identify makes controllers of its own, and compare one with an observer."""
 
-RECIPES = {
-    "controller": "equations/controllers",
-    "friction law": "equations/friction",
-    "kind of experiment": "identification/experiments",
-    "question": "questions",
-    "log format": "identification/logs",
-    "doubt about a log": "identification/doubts",
-    "parameter file": "drives/formats",
-    "target": "drives/targets",
-}
-"""What CONTRIBUTING.md explains how to add, and the folder for its file."""
-
-
-SHOWN_BY = {"blocks": 0, "basis": 0, "further_files": 0, "page_values": 0, "next_steps": 1}
-"""Functions of a question's folder that show its answers, and how much they take beside the subject."""
 
 MODULES = {
     ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
@@ -77,31 +55,6 @@ def sources() -> dict[str, str]:
     places = {path: path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
     places |= {path: path.relative_to(THESIS.parent) for path in THESIS.rglob("*.py")}
     return {place.as_posix(): path.read_text(encoding="utf-8") for path, place in places.items()}
-
-
-def types() -> dict[str, list[str]]:
-    """Public classes and other types at the top of modules, by name: the modules that have one of that name. Options of
-    commands, and types that stand for any, are left out."""
-    modules = defaultdict(list)
-    for name, text in sources().items():
-        for node in ast.parse(text).body:
-            if type_name := _type_name(node):
-                modules[type_name].append(name)
-    return modules
-
-
-def _type_name(node: ast.stmt) -> str | None:
-    if isinstance(node, ast.ClassDef):
-        name, value = node.name, None
-    elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-        name, value = node.targets[0].id, node.value
-    elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-        name, value = node.target.id, node.value
-    else:
-        return None
-    stands_for_any = isinstance(value, ast.Call) and ast.unparse(value.func) in ("TypeVar", "ParamSpec")
-    named = re.match("[A-Z].*[a-z]", name) and not name.endswith(("Option", "Argument"))
-    return name if named and not stands_for_any else None
 
 
 def texts(source: str) -> Iterator[str]:
@@ -125,36 +78,6 @@ def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
 def test_keys_are_imported_where_the_rules_of_tuning_are_the_subject() -> None:
     importing = [name for name, text in sources().items() if "from friso.equations.controllers." in text]
     assert [name for name in importing if not name.startswith((*KNOW_CONTROLLERS, *ABOUT_TUNING))] == []
-
-
-@pytest.mark.slow
-def test_the_name_of_a_type_stands_for_one_thing() -> None:
-    assert {name: where for name, where in types().items() if len(where) > 1} == {}
-
-
-def test_a_question_gives_its_blocks_in_one_place() -> None:
-    """What shows an answer stands in blocks.py, words.py or question.py and takes the subject; or is a method."""
-    wrong = []
-    for name, question in QUESTIONS.items():
-        places = [f"{question.package}.{part}" for part in ("blocks", "words", "question")]
-        modules = [importlib.import_module(place) for place in places if importlib.util.find_spec(place)]
-        shown = {key: getattr(module, key) for module in modules for key in SHOWN_BY if hasattr(module, key)}
-        takes = {key: len(inspect.signature(function).parameters) for key, function in shown.items()}
-        wrong += [f"{name}: {key}" for key, count in takes.items() if count != 1 + SHOWN_BY[key]]
-        classes = [item for item in vars(importlib.import_module(question.module)).values() if isinstance(item, type)]
-        answers = [item for item in classes if issubclass(item, Answer) and item.__module__ == question.module]
-        wrong += [item.__name__ for item in answers if ("blocks" in shown) == ("blocks" in vars(item))]
-    assert wrong == []
-
-
-@pytest.mark.parametrize("kind", RECIPES)
-def test_there_is_a_recipe(kind: str) -> None:
-    """The guide has a heading for what is added, and below it the folder of its file."""
-    sections = GUIDE.read_text(encoding="utf-8").split("\n#")
-    recipes = [section for section in sections if kind in section.partition("\n")[0].lower()]
-    assert any(f"friso/{RECIPES[kind]}/" in recipe for recipe in recipes)
-    folder = PACKAGE / RECIPES[kind]
-    assert [*folder.glob("[a-z]*.py"), *folder.glob("[a-z]*/question.py")] != []
 
 
 def test_the_drawing_of_the_house_is_of_what_there_is() -> None:

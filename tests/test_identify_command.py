@@ -1,7 +1,5 @@
 """Test `friso identify` as a user runs it: what it writes, says, predicts and refuses."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -30,8 +28,6 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.stage_file import fitting, identified_stage, origins, with_unknown
 from friso.interface.answer import Answer
 from friso.stage.correlations import correlations_file, read_correlations
-
-pytestmark = pytest.mark.xdist_group("identify-moves")
 
 SMALL = OutputErrorSettings(
     points_of_a_profile=3,

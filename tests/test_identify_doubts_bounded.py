@@ -1,7 +1,5 @@
 """No doubt claims what its record cannot contain: sizes are bounded by the record, and a single pass has no places."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

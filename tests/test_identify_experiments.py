@@ -1,7 +1,5 @@
 """Experiments in time: known truth from the simulator and from a twin of one mass, and what a record cannot show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -34,8 +32,6 @@ from friso.identification.response.modes import ResponseFit
 from friso.identification.sources import recognised
 from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
-
-pytestmark = pytest.mark.xdist_group("identify-experiments")
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DT = 1e-3

@@ -1,7 +1,5 @@
 """From estimates to a stage: how they are combined, which the stage file takes, and how its keys are related."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -174,7 +172,6 @@ def steady(speeds: list[float], rng: np.random.Generator) -> Log:
 def test_constant_speed_without_a_stribeck_curve_gives_a_stage(speeds: list[float], base: Stage) -> None:
     low = base.replace({"masses.cart": "20 kg", STATIC: "2 N", COULOMB: "2 N"})
     identification = identify([(steady(speeds * 4, np.random.default_rng(1)), "constant-speed")], low)
-    assert identification.stage is not None
     interval = identification.stage.uncertain()[COULOMB]
     assert interval.low < 5 < interval.high
     if len(speeds) > 2:

@@ -1,7 +1,5 @@
 """Logs of moves: simulated machines whose truth is known, and the EMPS record with what it cannot show."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -51,8 +49,6 @@ from friso.identification.settings import DoubtSettings
 from friso.identification.stage_file import made_up
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
-
-pytestmark = pytest.mark.xdist_group("identify-moves")
 
 ROOT = Path(__file__).parents[1]
 SMALL = OutputErrorSettings(
@@ -241,7 +237,6 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     inverse = inverse_model(log)
     speed = float(np.abs(moved_in(log, log["position"], inverse.bandwidth).velocity).max())
     inputs = moves_analysis._problems(log, log.segments[0], flat, inverse, speed, True)[1]
-    assert inputs is not None
     exact = replace(inputs, target=loop_problem(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     core = tuple(i for i, entry in enumerate(inputs.parameters) if entry.core)
     truth = {**flat, "static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
@@ -340,7 +335,6 @@ def mass_off(fitted: OutputErrorFit) -> float:
 
 def reach(doubt: RaisedDoubt) -> np.ndarray:
     """The half widths of a doubt's intervals of mass and friction, as logarithms."""
-    assert doubt.fit is not None
     return NORMAL_COVERAGE * np.sqrt(np.diag(doubt.fit.covariance))
 
 
@@ -412,7 +406,6 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound
     log = with_force(sound, force)
     fitted, bandwidth = rigid(log)
     case = fit_case(log, fitted, bandwidth)
-    assert case.leading is not None
     assert case.leading.doubt == effect
     (doubt,) = DOUBTS[effect].find(case)
     assert abs(doubt.size) == pytest.approx(truth, rel=0.3)
@@ -532,8 +525,6 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_further()
     case = fit_case(log, both, 20.0)
     (apart,) = forces.find_friction_by_direction(case)
     wider = apart.fit
-    assert wider is not None
-    assert case.leading is not None
     assert case.leading.tried.label == 1
     assert apart.spoils
     assert wider.inner == pytest.approx(both.inner)

@@ -1,7 +1,5 @@
 """Records that show next to nothing, read as every kind of experiment: an answer or a refusal, and no warning."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -326,7 +326,6 @@ def test_the_stage_file_takes_bristles_and_masses() -> None:
     stage = locked_stage(machine.truth)
     logs = [presliding_log(stage, f"small_{n}", travel(stage)[0], n).log for n in (1, 2)]
     identification = identify([(log, "presliding") for log in logs], machine.guess)
-    assert identification.stage is not None
     flat = identification.stage.flat()
     for key in ("friction.bristle_stiffness", "friction.bristle_damping", "masses.cart", "masses.stage"):
         assert flat[key] == pytest.approx(machine.flat[key], rel=0.03)

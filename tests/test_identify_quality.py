@@ -1,7 +1,5 @@
 """Quality of an identification: intervals that are never empty, noise, model error, and messages on a bad log."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
@@ -254,7 +252,6 @@ def test_a_log_that_changes_while_it_is_taken_says_so_and_its_intervals_hold_it_
     warmer = np.sign(np.gradient(log["position"])) * np.where(log.time > 3, 3.0, 0.0)
     inverse = inverse_model(with_signals(log, force=log["force"] + warmer + 0.5 * log.time), 5.0)
     changes = changes_beside(inverse)
-    assert changes is not None
     assert changes.friction == pytest.approx(3.0, rel=0.4)
     assert changes.constant == pytest.approx(0.5 * 8, rel=0.2)
     answers = {one.name: one for one in inverse_reaching(inverse, changes).estimates}
@@ -269,7 +266,6 @@ def test_a_number_of_which_nothing_is_known_does_not_move_and_hides_nothing(odd:
     wave, line, counted = np.sin(np.arange(500.0)), np.linspace(-1.0, 1.0, 500), np.ones(500)
     noise = 0.01 * np.random.default_rng(1).standard_normal(500)
     explained = explained_by(np.column_stack([wave, odd * counted]), noise - 2 * wave - 3 * line, [line], counted)
-    assert explained is not None
     assert [*explained.moved, *explained.sizes] == pytest.approx([2.0, 0.0, 3.0], abs=0.01)
 
 
@@ -418,7 +414,6 @@ def test_the_cause_of_what_is_left_is_found_and_without_it_the_log_says_what_is_
     assert any(cause.spoils for cause in found) or case != "limited"
     if true:
         name, truth, tolerance = true
-        assert found[0].without is not None
         assert found[0].without.value(name) == pytest.approx(truth, rel=tolerance)
 
 
@@ -450,7 +445,6 @@ def test_a_feed_forward_that_is_not_logged_is_found(monkeypatch: pytest.MonkeyPa
     lacking = with_signals(log, reference=ahead, force=log["force"] - 4.0 * np.gradient(np.gradient(ahead, DT), DT))
     inverse = inverse_model(lacking, 5.0)
     cause, case = causes_of(lacking)[0], RecordCase(lacking, inverse)
-    assert cause.without is not None
     assert inverse.value("mass") < 0.5 * MASS
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
     assert not [*controller.find_perhaps_feedforward(case)]  # it is certain

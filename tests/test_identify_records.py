@@ -1,7 +1,5 @@
 """Records as people have them: a velocity alone, a force in volts, gravity, a stage that stops short."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

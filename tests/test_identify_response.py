@@ -518,7 +518,6 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
             (),
             measured=MeasuredResponse(frequency, sign * values, None, "", unit="m/N"),
         )
-        assert bench.two_masses is not None
         assert all(bench.two_masses[name].value == pytest.approx(value, rel=1e-3) for name, value in truth.items())
         assert bool(KINDS["frequency"].doubts(bench)) is (sign < 0)
     above = 1.1 * bench.two_masses["antiresonance frequency"].value
@@ -527,7 +526,6 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
         (above, 100.0),
         measured=MeasuredResponse(frequency, values, None, "", unit="m/N"),
     ).two_masses
-    assert cut is not None, "the resonance lies in the band that the user gave"
     assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 
 

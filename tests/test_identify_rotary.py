@@ -1,7 +1,5 @@
 """Logs of a rotary axis: the same SI numbers as of a linear axis, in kg m^2, N m and rad; the axis is stated once."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Several logs: one event each, a controller of their own, and predictions refused before anything is fitted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What slow records leave undetermined, and machines drawn from that range."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any

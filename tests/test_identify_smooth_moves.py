@@ -1,7 +1,5 @@
 """What is a move and what is a rest hangs neither on durations, shapes and dwells nor on noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

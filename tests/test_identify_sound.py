@@ -1,7 +1,5 @@
 """Sound logs of an independent simulator, without noise of the force: no doubt is raised, intervals hold the truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs without an even clock show mass and friction at their own stamps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What `friso identify` says, writes and draws, on invented results: no engine and no fit is needed."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
@@ -47,8 +45,6 @@ from friso.shown.drawing.figure import Figure, Panel, Series
 from friso.stage.correlations import Correlations
 from friso_thesis.studies.identification.steps import stiffness_from_steps
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
-
-pytestmark = pytest.mark.xdist_group("identify-views")
 
 DT = 1e-3
 MASS, VISCOUS, COULOMB = 10.0, 50.0, 8.0

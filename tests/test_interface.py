@@ -1,7 +1,6 @@
 """The Python interface: a function per command, its options as keywords, and answers that people and programs read."""
 
 import doctest
-import importlib
 import inspect
 import json
 import subprocess
@@ -32,8 +31,6 @@ OF_THE_SHELL = {"--out", "--overwrite", "--json", "--details", "--help"}
 
 FUNCTIONS = {"map": "sweep"}
 """Commands whose function has another name."""
-
-pytestmark = pytest.mark.xdist_group("rig")
 
 
 def commands() -> dict[str, Any]:
@@ -189,8 +186,3 @@ def test_the_schema_takes_the_examples_and_has_every_key() -> None:
     assert friso.schema("specification")["properties"]["machine"]
     with pytest.raises(friso.InputError):
         friso.schema("design")
-
-
-def test_every_name_is_where_it_is_said_to_be() -> None:
-    for name, module in friso._LAZY.items():
-        assert hasattr(importlib.import_module(module), name)

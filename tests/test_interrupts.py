@@ -225,12 +225,9 @@ def test_the_app_ends_in_one_line(signals: list[signal.Signals]) -> None:
     """The app also does so if the terminal is closed, and if an impatient user presses Ctrl-C again."""
     command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         address = re.search(r"http://[^/]+", process.stdout.readline())
-        assert address is not None
         wait_until(lambda: _answers(address[0]))
         for number in signals:
             process.send_signal(number)
         assert process.wait(LIMIT) == 128 + signals[0]
-        assert process.stderr is not None
         assert process.stderr.read() == f"friso: {'interrupted' if signals[0] == signal.SIGINT else 'terminated'}\n"

@@ -1,7 +1,5 @@
 """The inverse model: exact without noise, at rest without a say, and the published values of the EMPS record."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

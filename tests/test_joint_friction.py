@@ -3,8 +3,6 @@
 Limits, formulas by hand, and what is said of hunting beside long runs of the equations by hand.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

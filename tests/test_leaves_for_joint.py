@@ -41,7 +41,6 @@ def joint(stiffness: str, stroke: str) -> Stage:
 def test_leaves_have_the_stiffness_and_bear_the_stroke(stiffness: str, stroke: str) -> None:
     rig = joint(stiffness, stroke)
     made = leaves_for_joint(rig, rig)
-    assert made is not None
     flat, wanted = made.flat(), rig.flat()["joint.stiffness"]
     by_beams = beams(Mechanism.of(flat), flat["joint.stroke"])
     assert flat["joint.stiffness"] == pytest.approx(wanted, rel=0.01)
@@ -88,7 +87,6 @@ def test_which_joints_have_leaves(changed: dict, present: dict | None, has: bool
 def test_a_coulomb_friction_close_to_a_static_one_that_is_known_well_is_outlined() -> None:
     rig = RIG.replace({"friction.static": "3 N +/- 5 %", "friction.coulomb": "2.8 N"})
     friction = read_spec(outline(rig)).friction
-    assert friction.coulomb is not None
     assert (friction.coulomb.low, friction.coulomb.high) == pytest.approx((0.7 * 2.8, 1.05 * 3))
 
 
@@ -99,7 +97,6 @@ def test_other_leaves_guide_and_carry_what_those_of_the_file_do(load: float) -> 
     present = LEAVES.replace(carried)
     (free,) = (remedy.stage for remedy in remedies(present, Goal(controller=False)) if remedy.name == "isolator")
     made = leaves_for_joint(free, present)
-    assert made is not None
     flat = made.flat()
     assert flat["flexure.sensor_x"] - flat["flexure.length"] == pytest.approx(40e-3)
     assert (flat["flexure.inertia_y"], flat["flexure.load"]) == (1e-3, load)
@@ -119,11 +116,8 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     isolator, made = tuning.outcomes
     assert tuning.working == (isolator,)
     assert tuning.made_of_leaves(isolator) is made
-    assert isolator.stage is not None
-    assert made.stage is not None
     assert made.stage.flat()["joint.stiffness"] == pytest.approx(isolator.stage.flat()["joint.stiffness"], rel=0.01)
     assert made.certainty == "works"
-    assert made.confirmation is not None
     assert (made.confirmation.verdict, made.confirmation.certain) == ("settles", True)
     files = further_files(tuning)
     written = loads(str(files["tuned-isolator-of-leaf-springs.toml"]))

@@ -1,7 +1,5 @@
 """Folders that are locked for as long as they are used, and those that killed processes left."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Lengths in sentences: none is finer than a step of the encoder, or than a run resolves."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One record in many variants is read at once and right, or asks, or is refused: never misread."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

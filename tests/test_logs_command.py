@@ -1,7 +1,5 @@
 """`friso logs` as a user runs it: what it shows of files of any kind, without identifying anything."""
 
-from __future__ import annotations
-
 import errno
 import json
 from pathlib import Path

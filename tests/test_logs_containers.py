@@ -1,7 +1,5 @@
 """One table in many containers: arrays, JSON, Parquet, workbooks and packed files give the same channels."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import json

@@ -1,7 +1,5 @@
 """Two files of one run, by two clocks: made twins of known offset and ratio, and those that cannot be aligned."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import log_files

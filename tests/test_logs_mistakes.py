@@ -1,7 +1,5 @@
 """Mistakes of logs that are said, with the way out: a wrong heading, lost parts, rounded stamps, words in LVM."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

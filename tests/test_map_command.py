@@ -23,8 +23,6 @@ from friso.shown.pages import Report
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 def friso(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     """Run the command line in a folder."""

@@ -1,7 +1,5 @@
 """Figures and pages of maps, on runs made up here: looking at maps needs no engine."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from book import BOOK
 from made_up import FakeCase, fake_stage, hunts, settles
 from variants import VARIANTS
 
@@ -40,18 +41,13 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
     """The rigid mass hunts; with half its static friction it does not, nor with half as much again."""
     case = check(RIGID)["given"]
     margin, edge = case.static_friction, case.judgement.margin
-    assert margin is not None
     assert margin.certain
     for end in (margin.below, margin.above):
-        assert end is not None
         assert attracts(RIGID, end.inside)
         assert not attracts(RIGID, end.outside)
         assert abs(np.log(end.outside / end.inside)) < 0.06
-    assert edge is not None
     assert (edge.crossover, edge.kind, edge.certain) == (pytest.approx(9.770, abs=1e-3), "flip", True)
     assert edge.factor < edge.quiet < 1.02 * edge.factor
-    assert margin.below is not None
-    assert margin.above is not None
     assert (margin.below.kind, margin.above.kind) == ("lost", "flip")
     assert margin.below.inside < 1 < margin.above.inside
 
@@ -60,23 +56,8 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_an_end_just_above_coulomb_friction_is_found() -> None:
     """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
-    stage = Stage(
-        masses={"stage": "0.009115 kg"},
-        friction={
-            **{"model": "elasto_plastic", "static": "0.2222 N", "coulomb": "0.1056 N", "viscous": "0.007666 N*s/m"},
-            **{"stribeck_velocity": "0.001483 m/s", "stribeck_exponent": 1.3, "breakaway_deflection": "2.391e-07 m"},
-            **{"bristle_stiffness": "344200.0 N/m", "bristle_damping": "38.42 N*s/m"},
-        },
-        controller={
-            **{"kind": "pid", "kp": "75.98 N/m", "ki": "3380.0 N/(m*s)", "kd": "0.7714 N*s/m", "tau": "0.002126 s"},
-            **{"derivative_on": "measurement", "force_limit": "1.68 N"},
-            **{"anti_windup": "back_calculation", "anti_windup_time": "0.01169 s"},
-        },
-        motion={"kind": "release", "displacement": "1 mm", "duration": "4 s"},
-    )
+    stage = BOOK["ends just above Coulomb friction"]
     margin = check(stage)["given"].static_friction
-    assert margin is not None
-    assert margin.below is not None
     assert margin.below.certain
     assert margin.range[0] <= margin.below.outside < 0.107 / 0.2222 < margin.below.inside < 0.112 / 0.2222
     assert attracts(stage, 0.109 / 0.2222)
@@ -87,9 +68,7 @@ def test_where_hunting_begins_is_told_of_a_stage_that_settles() -> None:
     """At half its static friction the rigid mass settles; with a little more it hunts. The first lines say so."""
     case = check(RIGID.replace({"friction.static": "1.4 N"}))["given"]
     margin = case.static_friction
-    assert margin is not None
     assert not margin.attracts
-    assert margin.above is not None
     assert margin.range == pytest.approx((1 / 1.4, 3.0))
     assert not attracts(case.stage, margin.above.outside)
     assert attracts(case.stage, margin.above.inside)

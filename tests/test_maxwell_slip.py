@@ -17,12 +17,8 @@ from friso.errors import InputError
 from friso.frequency.loops import plant
 from friso.frequency.system import level, member, speeds, steady_force
 from friso.hunting import Cycles, Ensemble, find_cycles
-from friso.identification.output_error.parameters import fit_parameters
-from friso.virtual_rig.run import as_built_keys, failures, run
+from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import own_motion
-from friso_thesis.studies.describing.multi import OneStateLaw as Waveform
-
-pytestmark = pytest.mark.xdist_group("maxwell_slip")
 
 STIFFNESS, STRENGTH, LIMIT = np.array([1e5, 8e4, 6e4]), np.array([0.9, 0.96, 0.96]), np.array([9e-6, 12e-6, 16e-6])
 
@@ -157,37 +153,13 @@ def test_small_motions_of_a_stage_that_sticks() -> None:
     assert np.max(np.abs(system.poles().imag)) > 0
 
 
-def test_harmonic_balance_refuses_modes_that_remember() -> None:
-    with pytest.raises(InputError, match="modes that remember"):
-        Waveform.of(MOVES.flat())
-
-
 # drive, identification, declaration
-
-
-def test_the_drive_as_built() -> None:
-    """A quick drive without imperfections moves the stage as the continuous loop does."""
-    built = MOVES.replace({"drive": {"sample_time": "20 us"}})
-    (recorded,) = run(built, own_motion(built), [0], 1e-3)
-    assert not failures(recorded)
-    result = friso.simulate(MOVES, 1e-8, 1e-3)
-    position = recorded.true["position"][0]
-    gap = np.abs(position - result.position.values[: len(position)])
-    assert gap.max() < 0.05 * np.ptp(position)
-    assert np.ptp(position) > 1e-5
 
 
 def test_a_rail_along_which_nothing_varies_is_refused() -> None:
     railed = MOVES.replace({"rail": {"seed": 1}})
     with pytest.raises(InputError, match="rail"):
         next(run(railed, own_motion(railed), [0], 1e-3))
-
-
-def test_identification_refuses_a_law_it_does_not_know() -> None:
-    levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
-    with pytest.raises(InputError, match="maxwell_slip") as refused:
-        fit_parameters(MOVES.flat(), levels, 0.1, 0.1, True)
-    assert all(law in str(refused.value) for law in ("lugre", "dahl", "stribeck", "rolling"))
 
 
 def test_a_switch_is_a_kink_whose_surface_depends_on_its_side() -> None:

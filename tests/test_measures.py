@@ -138,7 +138,6 @@ def test_compiled_loops_do_what_the_plain_ones_do() -> None:
     assert plain.peaks.sum() > plain.distinct.sum() > 0
 
 
-@pytest.mark.xdist_group("rig")
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
 def test_small_swings_that_are_passed_over_change_no_measure(rig: Stage, rtol: float) -> None:
     """The kernel keeps a zigzag of turning points only; against all of them, on stages that ring on their limiter."""

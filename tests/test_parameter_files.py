@@ -1,7 +1,5 @@
 """Parameter files of drives: to stages by the formulas of their firmware, and back; and files that are refused."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -122,7 +120,6 @@ def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force
     stage, size = friso.loads(text), {"mm": 1e-3, "inch": 0.0254, "deg": np.pi / 180}[unit]
     assert stage.flat()["controller.kp"] == pytest.approx(GAINS["P"] * float(force.split()[0]) / size)
     back = gains_of(stage, {**more, "machine_unit": unit}, "linuxcnc").parameters
-    assert back is not None
     assert {name: back[name] for name in GAINS} == pytest.approx(GAINS)
     assert back["MAX_ERROR_I"] == pytest.approx(0.01)
 
@@ -211,7 +208,6 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
         assert sum(sentence.startswith(start) for sentence in drawn.left_out) == 1
     assert "velocity_per_output" in " ".join(drawn.left_out)
     back = gains_of(drawn.stage, {"machine_unit": "mm", "velocity_per_output": "1 mm/s"}, "linuxcnc").parameters
-    assert back is not None
     assert {name: back[name] for name in gains} == pytest.approx(gains)
 
 
@@ -244,7 +240,6 @@ def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
     assert not any("velocity_per_output" in sentence for sentence in drawn.left_out)
     # the drawn stage contains the answer, which is not asked for again
     back = gains_of(friso.loads(drawn.text()), {}, "linuxcnc").parameters
-    assert back is not None
     assert [back[name] for name in ("P", "I", "FF1")] == pytest.approx([50.0, 10.0, 0.2])
     uncertain = drawn.stage.replace({"drive.velocity_per_output": "5 mm/s +/- 1 mm/s"})
     assert gains_of(uncertain, {}, "linuxcnc").parameters == pytest.approx(back)
@@ -292,7 +287,6 @@ def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
     labels = {**(MACHINE if travel == "5 mm" else ROTARY), **turn}
     drawn = stage_from(backup(tmp_path), None, labels)
     back = gains_of(friso.loads(drawn.text()), turn, "odrive").parameters
-    assert back is not None
     names = ("input_mode", "pos_gain", "vel_gain", "vel_integrator_gain", "inertia", "vel_integrator_limit")
     assert [back[f"controller.config.{name}"] for name in names] == pytest.approx([CONTROL[name] for name in names])
     assert back["encoder.config.bandwidth"] == back["motor.config.current_control_bandwidth"] == pytest.approx(1000.0)
@@ -472,7 +466,6 @@ def test_an_odrive_feeds_forward_along_its_own_trajectories(share: float, mode: 
     keys = {"controller.velocity_feedforward": share}
     stage = friso.load(EXAMPLES / "twincat_cascade.toml").replace(keys)
     back = gains_of(stage, {"travel_per_turn": "10 mm"}, "odrive")
-    assert back.parameters is not None
     assert back.parameters["controller.config.input_mode"] == mode
     assert ("controller.config.inertia" in back.parameters) == (share == 1.0)
     assert {key for key in back.not_held if "feedforward" in key} == {f"controller.{name}_feedforward" for name in lost}

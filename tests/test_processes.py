@@ -21,8 +21,6 @@ from friso.studies.sweep import processes, run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 @pytest.mark.slow
 def test_processes_of_its_own_give_the_same_and_open_no_port(
@@ -87,7 +85,6 @@ def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> 
     with subprocess.Popen(
         [sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environ
     ) as parent:
-        assert parent.stdout is not None
         worker = psutil.Process(int(parent.stdout.readline()))
         assert len([*tmp_path.glob("friso-kernels-*")]) == 1
         parent.send_signal(signal.SIGKILL if kill else signal.SIGINT)

@@ -1,7 +1,5 @@
 """Code for processors and systems other than this one: it can be written, and needs nothing that is not there."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -15,10 +15,6 @@ import friso
 from friso.stage import Stage
 
 STICK_SLIP = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
-CART = pytest.mark.xdist_group("cart")
-RIGID = pytest.mark.xdist_group("rigid")
-LOCKED_RIG = pytest.mark.xdist_group("locked")
-FREE_RIG = pytest.mark.xdist_group("free")
 
 
 def simulated(chosen: Stage, sample_time: float) -> xr.Dataset:
@@ -34,7 +30,6 @@ def crossings(response: xr.Dataset, speed: float) -> np.ndarray:
     return t[at] + (speed - v[at]) / (v[at + 1] - v[at]) * (t[at + 1] - t[at])
 
 
-@CART
 def test_stick_slip() -> None:
     """While it sticks it still creeps by some micrometres: the numbers of the plateaus hold at these times."""
     stick_slip = simulated(STICK_SLIP, 1e-4)
@@ -48,7 +43,6 @@ def test_stick_slip() -> None:
     assert plateaus.velocity.to_numpy() == pytest.approx(0, abs=1e-5)
 
 
-@CART
 @pytest.mark.parametrize(("stiffness", "period"), [(1e5, 7.494), (1e6, 7.655)])
 def test_limit_without_bristles(stiffness: float, period: float) -> None:
     """Period and top speed without bristles and viscous friction, in closed form; with bristles near it.
@@ -72,7 +66,6 @@ def test_limit_without_bristles(stiffness: float, period: float) -> None:
     assert float(response.velocity.max()) == pytest.approx(closed_speed, rel=0.03)
 
 
-@CART
 @pytest.mark.parametrize(("rate", "force"), [(1, 1.42), (10, 1.21), (20, 1.09), (35, 1.0), (50, 1.0)])
 def test_break_away_force_falls_with_the_rate_of_force(rate: float, force: float) -> None:
     """The largest force of the bristles while a mass of 1 kg is pushed by a ramp of force [N/s] (3 %: off a figure)."""
@@ -81,7 +74,6 @@ def test_break_away_force_falls_with_the_rate_of_force(rate: float, force: float
     assert 1e5 * float(response.bristle_deflection.max()) == pytest.approx(force, rel=0.03)
 
 
-@RIGID
 def test_cycle_of_a_rigid_mass_at_4_hz() -> None:
     """T 3.15031069 s, A 2.0166608 mm, half-period multiplier -0.8172509 (shooting at rtol 1e-12)."""
     motion = {"kind": "step", "size": "-2 mm", "duration": "300 s"}
@@ -105,7 +97,6 @@ def jumping(crossover: float, size: float, joint: str = LOCKED) -> Stage:
 
 
 @pytest.mark.cases(first=2)
-@LOCKED_RIG
 @pytest.mark.parametrize(
     ("crossover", "displacement", "amplitude", "multiplier"),
     [(4, 2, 2.016e-3, -0.82), (6, 0.89, 0.904e-3, -0.875), (8, 1.9, 0.520e-3, -0.935)],
@@ -118,7 +109,6 @@ def test_cycles_of_the_locked_rig(crossover: float, displacement: float, amplitu
     assert slope == pytest.approx(multiplier, rel=0.01)
 
 
-@LOCKED_RIG
 @pytest.mark.parametrize(("crossover", "dies", "hunts"), [(4, 0.23, 0.26), (8, 1.65, 1.8)])
 def test_jump_that_starts_hunting(crossover: float, dies: float, hunts: float) -> None:
     """Bistable: it takes a jump of about 0.25 mm at 4 Hz and 1.75 mm at 8 Hz to start hunting from rest.
@@ -133,7 +123,6 @@ def test_jump_that_starts_hunting(crossover: float, dies: float, hunts: float) -
 
 
 @pytest.mark.slow
-@FREE_RIG
 def test_cycles_of_the_free_rig() -> None:
     """At 3 Hz, to the digits given, where only a hard move starts it, and at 5 Hz."""
     for moving, amplitude, multiplier, off in (

@@ -1,7 +1,5 @@
 """Loops at several rates: exact lifting against difference equations by hand and python-control."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import get_args
 

@@ -1,7 +1,5 @@
 """What is refused, as rows of tests/refusals.toml: each names its key, shows what was given, and writes nothing."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from functools import cache

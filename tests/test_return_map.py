@@ -1,12 +1,10 @@
 """Hunting by the return map: known maps, the thesis rig compared with the search, and results that are no map."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from beyond_flip import CREEPING
+from book import BOOK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -152,7 +150,6 @@ def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage) -> None:
 def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
     known = hunting(locked)
     assert known.target is not None
-    assert known.surveyed is not None
     target, landing_map = known.target, resolved_map(Ensemble.held(locked.flat(), 1), known.surveyed.motions)
     assert landing_map is not None
     long_runs = displacements_that_hunt(locked, target)
@@ -164,7 +161,6 @@ def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
 def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
     """9.750 Hz, where its cycle flips; nothing attracts a hundredth beyond."""
     margin = find_margin(locked, attracting=True)
-    assert margin is not None
     assert margin.crossover == pytest.approx(9.750, rel=2e-4)
     beyond = {**locked.flat(), "controller.crossover": 9.75 * np.array([0.99, 1.01])}
     answer = find_attractors(beyond, 2)
@@ -194,7 +190,6 @@ def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
     The sampled points of the map are farther apart there. The search alone also finds a multiplier of -0.68.
     """
     edge = find_margin(draw(7001, 83, "stages").variants()["locked"], attracting=False)
-    assert edge is not None
     assert edge.factor < 0.46474 < edge.quiet
 
 
@@ -210,7 +205,7 @@ def test_a_swing_beside_a_cycle_that_repels_is_not_taken_for_it(crossover: str) 
 @pytest.mark.parametrize("crossover", [12.975, 12.98, 12.985, 12.99])
 def test_a_cycle_on_a_narrow_piece_of_the_map_attracts(crossover: float) -> None:
     """The piece ends 0.5 % below the cycle and 1 % above it, and no start of a survey lands on it."""
-    stage = CREEPING.replace({"controller.crossover": f"{crossover} Hz", "friction.static": "28.6 N"})
+    stage = BOOK["creeping"].replace({"controller.crossover": f"{crossover} Hz", "friction.static": "28.6 N"})
     assert what_attracts(Ensemble.held(stage.flat(), 1)).attracts[0]
 
 
@@ -219,25 +214,10 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
     """Many maps of this stage are not resolved; its edge at 9.54 times the bandwidth is found all the same."""
     touching = draw(7001, 47, "stages").variants()["locked"]
     edge = find_margin(touching, attracting=True)
-    assert edge is not None
     assert edge.factor == pytest.approx(9.5422, rel=1e-3)
 
 
-SCHEDULED = Stage(
-    masses={"stage": "4.858 kg"},
-    friction={
-        **{"model": "lugre", "static": "9.036 N", "coulomb": "5.197 N", "viscous": "1.128 N*s/m"},
-        **{"stribeck_velocity": "0.001754 m/s", "stribeck_exponent": 2.0},
-        **{"bristle_stiffness": "209900.0 N/m", "bristle_damping": "692.9 N*s/m"},
-    },
-    controller={
-        **{"kind": "pid", "kp": "4122.0 N/m", "ki": "9761.0 N/(m*s)", "kd": "122.2 N*s/m"},
-        **{"derivative_on": "error", "tau": "0.00168 s"},
-        "schedule_error": ["0.0001325 m", "0.000265 m", "0.00106 m"],
-        "schedule_factor": [0.2997, 0.656, 0.8678],
-    },
-    motion={"kind": "release", "displacement": "0.006576 m", "duration": "13.7 s"},
-)
+SCHEDULED = BOOK["scheduled"]
 """Gains follow a schedule. Below 0.8925 times its bandwidth a symmetric cycle attracts; an asymmetric one does so, from
 half of the displacements, up to between 0.910 and 0.915 times."""
 
@@ -245,7 +225,6 @@ half of the displacements, up to between 0.910 and 0.915 times."""
 @pytest.mark.slow
 def test_an_asymmetric_cycle_that_outlives_a_flip_makes_the_edge() -> None:
     edge = find_margin(SCHEDULED, attracting=False)
-    assert edge is not None
     assert 0.908 < edge.factor < 0.915 < edge.quiet < 0.921
     factors = (0.905, edge.factor * 0.998, edge.quiet)
     assert [bool(find_swings(faster(SCHEDULED.flat(), factor))) for factor in factors] == [True, True, False]

@@ -1,7 +1,5 @@
 """The loop closed: what the rig logs of a drawn machine comes back from files as a stage that holds the truth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +27,6 @@ def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path)
     stroke = freed(machine.truth).flat()["joint.stroke"]
     guess = machine.guess.with_numbers({"joint.stroke": stroke})
     identification = identify(sources(files), guess)
-    assert identification.stage is not None
     save(identification.stage, tmp_path / "identified.toml")
     labels = load(tmp_path / "identified.toml").uncertain()
     assert set(labels) == {STIFFNESS, STATIC}

@@ -92,7 +92,6 @@ def test_compiled_functions_are_those_of_plain_python(function: Callable[..., No
 
 
 @VECTORS
-@pytest.mark.xdist_group("rigid")
 def test_steps_are_vectorised() -> None:
     """The step of a kernel works on whole registers; hardly anything is done lane by lane."""
     written = vector_code.vector_llvm({"step": kernel(structure(VARIANTS["rigid"].flat())).module.step}, LANES)

@@ -75,7 +75,6 @@ def test_the_edge_of_a_map_is_that_at_which_followed_cycles_cease_to_attract(
     locked: Stage, sketched: SweepAnswer
 ) -> None:
     """On every line between cells, and on those through the stage, it is the flip that `friso boundary` follows."""
-    assert sketched.edges is not None
     (along_speed, _) = sketched.edges.own
     (edge,) = along_speed.changes
     (branch, *_) = friso.boundary(locked, {"speed": "0.9..1.4"}).result.special

@@ -34,7 +34,6 @@ def test_a_mass_pulled_slowly_sticks_and_slips_and_a_fast_one_does_not(pulled: S
     assert (speeds.lasts, speeds.sticks) == (True, True)
     (range_,) = speeds.ranges
     assert range_.quiet_below is None
-    assert range_.quiet_above is not None
     assert range_.quiet_above / range_.fastest < 1.05
     assert swing_at(pulled, range_.fastest * 0.97) > 1e3 * swing_at(pulled, range_.quiet_above * 1.03)
 

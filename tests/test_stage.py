@@ -311,22 +311,6 @@ def test_stages_copy_pickle_and_are_frozen_and_hashable(rig: Stage) -> None:
     assert hash(rig) == hash(load(THESIS_RIG))
 
 
-@pytest.mark.parametrize(
-    ("kind", "key", "text", "si"),
-    [("release", "displacement", "-2 mm", -2e-3), ("step", "size", "1 m", 1.0), ("ramp", "velocity", "0.1 m/s", 0.1)],
-)
-def test_other_motions(rig: Stage, kind: str, key: str, text: str, si: float) -> None:
-    flat = rig.replace({"motion": {"kind": kind, key: text, "duration": "1 s"}}).flat()
-    assert flat[f"motion.{key}"] == si
-
-
-def test_other_friction_laws(rig: Stage) -> None:
-    dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0 N*s/m"}
-    flat = rig.replace({"friction": dahl}).flat()
-    assert (flat["friction.model"], flat["friction.coulomb"]) == ("dahl", 1.0)
-    assert rig.replace({"friction": {"model": "none"}}).flat()["friction.model"] == "none"
-
-
 @pytest.mark.parametrize("value", ["12", "12.0", "12hz", "12 HZ", " 12 Hz "])
 def test_a_typed_number_has_the_unit_in_which_the_file_has_the_key(rig: Stage, value: str) -> None:
     assert stage_of(rig, [f"controller.crossover={value}"]).flat()["controller.crossover"] == 12.0

@@ -3,8 +3,6 @@
 They are compared with a model written by hand and with a real drive; the statements on hunting with them are tested.
 """
 
-from __future__ import annotations
-
 from math import exp, pi, sin
 from typing import Any
 

@@ -34,8 +34,6 @@ from friso.studies.sweep import local_crew, run_in_store, sweep
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
-pytestmark = pytest.mark.xdist_group("rig")
-
 
 def study_on(rig: Stage) -> Study:
     return Request(rig, AXES).study()
@@ -246,7 +244,6 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> N
     path = tmp_path / "a.zarr"
     command = [sys.executable, "-c", HOLD.replace("{AXES!r}", repr(AXES)), str(EXAMPLES / "thesis_rig.toml"), str(path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
         process.stdout.readline()
         with refused(kind=StoreError):
             sweep(rig, AXES, store=path)

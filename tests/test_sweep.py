@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from beyond_flip import CREEPING
+from book import BOOK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -18,8 +18,6 @@ from friso.studies.sweep import sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
-
-pytestmark = pytest.mark.xdist_group("rig")
 
 
 @pytest.mark.slow
@@ -212,7 +210,6 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
         assert np.array_equal(runs[name].values[:, 0], runs[name].values[:, 1], equal_nan=True)
         assert np.isnan(runs[name].values[2]).all()
     cycle = friso.check(locked)["given"].judgement.cycle
-    assert cycle is not None
     alone = (cycle.multiplier, cycle.amplitude, cycle.period)
     result = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
     assert result == pytest.approx(alone, rel=1e-9)
@@ -225,7 +222,7 @@ def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None
     """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
     1e-7 and 1e-9, and gone at the higher."""
     metrics = ["multiplier", "amplitude", "verdict"]
-    runs = sweep(CREEPING, {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
+    runs = sweep(BOOK["creeping"], {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
     assert runs.attractor.values[0] in ("cycle", "swing")
     assert runs.attractor.values[1] == "nothing"
     assert runs.verdict.values[0] in ("hunts", "bistable")

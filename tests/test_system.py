@@ -1,7 +1,5 @@
 """Cores that a process may use: those it is confined to, and the time that a container leaves it."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

@@ -1,7 +1,5 @@
 """FMUs: FMPy validates, compiles and runs them, and they reproduce friso's runs as built."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The deviation that counts as in position: of the user, of the stage, and never finer than the machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -213,7 +213,6 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
     """All motions shrink in proportion to the backlash, so no small share of it ends them."""
     result = feeding(backlash_alone)
-    assert result is not None
     assert (result.friction, result.backlash.needed, result.backlash.gone) == (None, True, 0.0)
     assert "backlash" in " ".join(feeding_sentences(result))
 
@@ -261,7 +260,6 @@ def test_bode_across_a_transmission() -> None:
     one_by_one = [response(flat, case, DriveTiming.of(flat))(omega) for case in every]
     assert together == pytest.approx(np.array(one_by_one), rel=0.03)  # but for the aliases of the plant
     highest = limits(flat).highest_stable
-    assert highest is not None
     edge = [spectral_abscissa(faster(flat, highest * f), settled_members(flat)).max() for f in (0.99, 1.01)]
     assert edge[0] < 0 < edge[1]
 

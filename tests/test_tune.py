@@ -428,7 +428,6 @@ def test_the_answer_does_not_hunt(tuning: Advice, works: Any) -> None:
     case = check_given(works.stage)
     edge = case.judgement.margin
     assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
-    assert edge is not None
     assert edge.factor * tuning.goal.distance < 1
     assert settled_margin(works.stage.flat()) >= tuning.goal.margin
 
@@ -517,8 +516,6 @@ def test_the_distance_from_hunting_is_that_from_its_edge(rigid: Stage, goal: Goa
     The stage's own motion does not settle in time at the lower bandwidth, which is no doubt.
     """
     edge = find_margin(rigid.replace({"controller.crossover": "12 Hz"}), attracting=False)
-    assert edge is not None
-    assert edge.crossover is not None
     ends = edge.crossover / edge.factor * np.array([edge.factor * 0.995, edge.quiet * 1.005]) * goal.distance
     near, far = (verified.confirmed(rigid.replace({"controller.crossover": f"{end} Hz"}), goal) for end in ends)
     assert (near.doubts, far.doubts) == (("distance",), ())
@@ -682,8 +679,6 @@ def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet
 def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     """At 8 Hz one isolator settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
-    assert tried is not None
-    assert none is not None
     flat = tried.stage.flat()
     assert (tried.settles, none.settles) == (True, False)
     assert flat["joint.stiffness"] * flat["joint.stroke"] < flat["friction.static"]

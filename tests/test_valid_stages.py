@@ -1,7 +1,5 @@
 """Whatever friso takes as a stage, all of it takes: joints of which a file tells a part, and stages drawn at random."""
 
-from __future__ import annotations
-
 import logging
 import random
 from collections.abc import Callable

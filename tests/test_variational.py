@@ -80,7 +80,6 @@ def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("rigid")
 @STEADY
 @given(
     crossover=st.floats(2, 15),
@@ -101,11 +100,11 @@ def test_flow_of_a_rigid_mass(
 
 
 CASES = [
-    pytest.param(name, time, crosses, marks=pytest.mark.xdist_group(group))
-    for name, group, times in (
-        (RIGID, "rigid", ((0.03, False), (2.6, True))),
-        (LOCKED_RIG, "locked", ((0.02, False), (0.3, True), (1.1, True))),
-        (FREE_RIG, "free", ((0.02, False), (0.3, True), (1.1, True))),
+    (name, time, crosses)
+    for name, times in (
+        (RIGID, ((0.03, False), (2.6, True))),
+        (LOCKED_RIG, ((0.02, False), (0.3, True), (1.1, True))),
+        (FREE_RIG, ((0.02, False), (0.3, True), (1.1, True))),
     )
     for time, crosses in times
 ]
@@ -125,7 +124,6 @@ def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -
     assert np.all(off(stages, start, time, flow(stages, start, time)) < CLOSE)
 
 
-@pytest.mark.xdist_group("gains")
 @pytest.mark.parametrize("time", [0.02, 0.05, 0.1, 0.3, 0.5])
 def test_flow_at_the_force_limit(time: float) -> None:
     """The stage starts 10 mm off at the full force of 6 N, with the integrator at rest and later running.
@@ -185,7 +183,6 @@ def bounce() -> Bounce:
     return Bounce()
 
 
-@pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> None:
     """Touching and leaving a damped limiter the force jumps: in contact after 0.5 ms, free again after 1 ms."""
@@ -193,7 +190,6 @@ def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> Non
     assert np.all(off(bounce.stages, bounce.start, time, flow(bounce.stages, bounce.start, time)) < CLOSE)
 
 
-@pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_deviations_jump_at_the_limiter_by_the_saltation_matrix(bounce: Bounce, time: float) -> None:
     """Put together from pieces without a contact inside and saltation matrices by hand, the derivative is the same but
@@ -231,7 +227,6 @@ def test_deviations_follow_the_linearised_equations(name: str) -> None:
     assert sp.expand(sp.Matrix([state.derivative for state in whole.states[n:]]) - expected) == sp.zeros(n, 1)
 
 
-@pytest.mark.xdist_group("rigid")
 @pytest.mark.parametrize("time", [0.03, 2.6])
 def test_a_run_is_the_same_with_deviations_and_without(time: float) -> None:
     """Deviations do not influence the steps; rounding differs, since common terms are computed once."""

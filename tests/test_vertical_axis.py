@@ -1,7 +1,5 @@
 """A vertical axis: its weight is a constant force, which the actuator carries before anything moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

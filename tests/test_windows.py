@@ -3,8 +3,6 @@
 They are compared in continuous time and as a drive samples; what is said of hunting is compared with long runs.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -129,7 +129,6 @@ def test_a_noisy_force_at_the_limit_of_the_file_does_not_count(share: float) -> 
     noise = 2e-3 * limit * np.random.default_rng(2).standard_normal(len(log.time))
     noisy = replace(log, signals={**log.signals, "force": log["force"] + noise})
     replay = replayed(noisy, STAGE.replace({"controller.force_limit": f"{limit} N"}).flat())
-    assert replay is not None
     assert replay.agrees
     assert not replay.refutes
 
@@ -158,21 +157,18 @@ def test_samples_whose_time_stamps_scatter_are_tried_as_even(tmp_path: Path, pla
     read = read_log(path)
     assert Witness(read, STAGE.flat()).best().left > 0.15
     taken, replay = witnessed(read, STAGE.flat())
-    assert replay is not None
     assert replay.agrees
     assert replay.left < 0.05
     assert taken["position"] == pytest.approx(columns[2], abs=1e-12)
     other = STAGE.replace({"controller.kp": "1e3 N/m", "controller.ki": "2e6 N/(m*s)", "controller.kd": "5 N*s/m"})
     stamped, refuted = witnessed(read, other.flat())
     assert stamped is read
-    assert refuted is not None
     assert refuted.refutes
 
 
 def test_a_step_of_the_force_is_no_switch_of_gains() -> None:
     stepped = changed(force=LOG["force"] + 20.0 * (LOG.time > 3))
     replay = replayed(stepped, STAGE.flat())
-    assert replay is not None
     assert replay.steps
     assert not replay.refutes
     assert "constant force" in doubt_of(replay, stepped)
@@ -210,5 +206,4 @@ def test_noise_of_the_force_is_no_other_controller(integral: float) -> None:
     noise = 0.2 * np.std(log["force"]) * np.random.default_rng(1).standard_normal(len(log.time))
     noisy = replace(log, signals={**log.signals, "force": log["force"] + noise})
     replay = replayed(noisy, STAGE.flat() | {"controller.ki": integral})
-    assert replay is not None
     assert replay.explains == (integral > 0)

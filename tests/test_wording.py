@@ -18,7 +18,6 @@ EXAMPLES = TESTS.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
 STICK_SLIP = EXAMPLES / "lugre_stick_slip.toml"
 
-pytestmark = pytest.mark.xdist_group("rig")
 
 MISTAKES = {
     "init": ("no/folder/stage.toml",),

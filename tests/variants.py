@@ -1,11 +1,11 @@
-"""Every kind of stage the equations distinguish, as stage files, for the tests that must hold for all of them."""
+"""Parts of stage files, of which tests put stages together; kinds of stage stand in the book (`VARIANTS`)."""
 
 import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
 
-import maxwell_slip as maxwell_slip
+from book import VARIANTS as VARIANTS
 
 import friso
 from friso.engine.build import write_module
@@ -180,131 +180,7 @@ def stage(
     return friso.loads("\n".join(f"[{name}]\n{body}\n" for name, body in sections.items() if body))
 
 
-CONDITIONS = {
-    f"conditions.{key}": value
-    for key, value in {
-        **{"load": 1.3, "load_share": 0.8, "load_per_acceleration": "0.01 s^2/m"},
-        **{"cold": 1.6, "running_time": "5 min", "warm_up_time": "20 min"},
-    }.items()
-}
-
 FULL = {"kp": 3000, "ki": 2000, "kd": 60}
-
-VARIANTS: dict[str, Stage] = {
-    "rigid": stage(release(), friction=lugre(2), controller=van_dijk("4 Hz")),
-    "rigid cart, P": stage(ramp(), "cart", lugre(2, "1.5 N", "0.4 N*s/m"), controller=gains(2)),
-    "rigid stage, PI": stage(step(), "stage", lugre(1), controller=gains(1000, 500)),
-    "rigid, no friction, PID": stage(step(), friction=NO_FRICTION, controller=gains(kp=1000, ki=2000, kd=50, tau=2e-3)),
-    "rigid, no friction section": stage(there_and_back(), controller=van_dijk("20 Hz")),
-    "rigid, LuGre 3, P": stage(release(), friction=lugre(3), controller=gains(1000)),
-    "rigid, Stribeck 1.5, PD measured": stage(
-        there_and_back(), friction=stribeck(1.5), controller=gains(kp=1000, kd=20, extra=MEASURED)
-    ),
-    "rigid, Stribeck 2, PI, limit": stage(
-        ramp(), friction=stribeck(2), controller=gains(1000, 500, extra=limit("4 N"))
-    ),
-    "rigid, Stribeck 3": stage(HOLD, friction=stribeck(3), controller=gains(1000)),
-    "rigid, Dahl, PD limit": stage(
-        there_and_back(), "cart", DAHL, controller=gains(kp=1000, kd=20, extra=MEASURED + limit("4 N"))
-    ),
-    "rigid, LuGre 0.7, PID measured": stage(
-        step(), friction=lugre(0.7), controller=gains(**FULL, tau=1e-3, extra=MEASURED)
-    ),
-    "rigid, Maxwell slip, PID": stage(step(), friction=maxwell(), controller=gains(**FULL, tau=1e-3)),
-    "free, parasitic, Maxwell slip": stage(
-        there_and_back(), friction=maxwell(), joint=free(), parasitic=PARASITIC, controller=van_dijk()
-    ),
-    "rigid, elasto-plastic": stage(step(), friction=elasto_plastic(1.5), controller=van_dijk()),
-    "free, elasto-plastic 1": stage(
-        there_and_back(), friction=elasto_plastic(1), joint=free(), controller=gains(**FULL, tau=1e-3)
-    ),
-    "rigid, rolling": stage(release(), friction=rolling(), controller=van_dijk()),
-    "rigid, dwell": stage(release(), friction=dwell(), controller=van_dijk()),
-    "free, dwell 1": stage(
-        there_and_back(), friction=dwell(exponent=1), joint=free(), controller=gains(**FULL, tau=1e-3)
-    ),
-    "rigid, load-dependent": stage(release(), friction=load_dependent(), controller=van_dijk()),
-    "free, load-dependent 1": stage(
-        there_and_back(), friction=load_dependent(exponent=1), joint=free(), controller=gains(**FULL, tau=1e-3)
-    ),
-    "rigid, conditions": stage(there_and_back(), friction=lugre(2), controller=van_dijk()).replace(CONDITIONS),
-    "rigid, GMS": stage(release(), friction=gms(damping=MICRO_DAMPING), controller=van_dijk()),
-    "free, parasitic, GMS 1": stage(
-        there_and_back(), friction=gms(1), joint=free(), parasitic=PARASITIC, controller=van_dijk()
-    ),
-    "rigid, van Dijk, limit": stage(step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))),
-    "rigid, limit, wound up": stage(
-        step("10 mm"), friction=lugre(2), controller=gains(**FULL, tau=1e-3, extra=limit("6 N", "none"))
-    ),
-    "rigid, limit, back-calculation": stage(
-        step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N", "back_calculation", "20 ms"))
-    ),
-    "rigid, cascade": stage(
-        there_and_back(acceleration="1 m/s^2"),
-        friction=lugre(2),
-        controller=cascade(
-            velocity_integral_time="30 ms",
-            acceleration_feedforward="1.7 kg",
-            coulomb_feedforward="1 N",
-            viscous_feedforward="0.5 N*s/m",
-            extra="velocity_feedforward = 0.9\n" + limit("6 N"),
-        ),
-    ),
-    "rigid, cascade, two integrals": stage(
-        step(),
-        friction=lugre(2),
-        controller=cascade(
-            position_integral_time="90 ms",
-            velocity_integral_time="30 ms",
-            proportional_on="measurement",
-            velocity_filter="1 ms",
-        ),
-    ),
-    "rigid, PI, filters, limit": stage(
-        step(), friction=lugre(2), controller=gains(2000, 5000, extra=limit("4 N") + FORWARD_FILTERS + FEEDBACK_FILTERS)
-    ),
-    "rigid, van Dijk, low-pass": stage(
-        step(),
-        friction=lugre(2),
-        controller=van_dijk(
-            "8 Hz",
-            limit("6 N", "back_calculation", "20 ms")
-            + a_filter("low_pass", frequency="200 Hz", order=2, damping_ratio=0.6),
-        ),
-    ),
-    "rigid, cascade, filters": stage(
-        step(),
-        friction=lugre(2),
-        controller=cascade(velocity_integral_time="30 ms", extra=FEEDBACK_FILTERS + FORWARD_FILTERS),
-    ),
-    "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
-    "locked, parasitic": stage(
-        there_and_back(), friction=lugre(2), joint=LOCKED, parasitic=PARASITIC, controller=van_dijk()
-    ),
-    "locked, Stribeck 1": stage(ramp(), friction=stribeck(1), joint=LOCKED, controller=gains(**FULL, tau=1e-3)),
-    "free": stage(there_and_back(), friction=lugre(4), joint=free(), controller=van_dijk()),
-    "free, parasitic": stage(
-        there_and_back(), friction=lugre(2), joint=free(), parasitic=PARASITIC, controller=van_dijk()
-    ),
-    "free, limiter that only pushes": stage(
-        there_and_back(),
-        friction=lugre(2),
-        joint=free("20 um").replace('"100 N*s/m"', '"2e4 N*s/m"') + "\nlimiter_pulls = false",
-        parasitic=PARASITIC,
-        controller=van_dijk(),
-    ),
-    "free, no friction, limit": stage(
-        step("5 mm"), joint=free("0.3 mm"), controller=gains(**FULL, extra=MEASURED + limit("20 N"))
-    ),
-    "free, parasitic, Dahl, PD": stage(
-        release(), friction=DAHL, joint=free(), parasitic=PARASITIC, controller=gains(3000, kd=60, tau=1e-3)
-    ),
-    "free, LuGre 2.5, P": stage(release(), friction=lugre(2.5), joint=free(), controller=gains(1000)),
-    "touching": stage(step(), friction=DAHL, joint=TOUCHING, controller=gains(**FULL, tau=1e-3)),
-    "touching, parasitic": stage(
-        HOLD, friction=stribeck(2.5), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk()
-    ),
-}
 
 
 def plain_module(chosen: Stage, folder: Path, method: str = "Rodas5P") -> ModuleType:
@@ -314,8 +190,6 @@ def plain_module(chosen: Stage, folder: Path, method: str = "Rodas5P") -> Module
     file.write_text(write_module(assemble(form), TABLEAUS[method], repr(form), lanes=8))
     name = f"plain_kernel_{abs(hash((form, method)))}"
     spec = importlib.util.spec_from_file_location(name, file)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)

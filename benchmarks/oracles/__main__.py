@@ -5,8 +5,6 @@ asks one oracle. `--table` writes the page [Oracles](oracles.md), and keeps the 
 `--grow` adds stages to the set with edges by brute force, for some seconds; it continues where it stopped.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

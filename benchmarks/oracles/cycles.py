@@ -1,14 +1,12 @@
 """Compare friso's cycles, multipliers and bifurcations with those of SciPy (`orbits.py`)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from benchmarks.oracles import orbits
-from benchmarks.oracles.oracle import Finding, Oracle, number
+from benchmarks.oracles.oracle import Finding, Oracle, lugre, number
 from friso.hunting import CYCLE_RTOL, Cycles, Diagram, Ensemble, KeyRange, LocatedPoint, Space, diagram, find_cycles
 from friso.stage import Stage
 
@@ -29,16 +27,9 @@ def stage(crossover: float) -> Stage:
     return Stage(
         name="rigid mass of 1.7 kg",
         masses={"cart": "1.2 kg", "stage": f"{orbits.MASS - 1.2:.1f} kg"},
-        friction={
-            "model": "lugre",
-            "static": f"{orbits.STATIC} N",
-            "coulomb": f"{orbits.COULOMB} N",
-            "stribeck_velocity": f"{orbits.STRIBECK} m/s",
-            "stribeck_exponent": 2,
-            "bristle_stiffness": f"{orbits.SIGMA_0!r} N/m",
-            "bristle_damping": f"{float(orbits.SIGMA_1)!r} N*s/m",
-            "viscous": f"{orbits.SIGMA_2} N*s/m",
-        },
+        friction=lugre(
+            orbits.STATIC, orbits.COULOMB, orbits.STRIBECK, orbits.SIGMA_0, float(orbits.SIGMA_1), orbits.SIGMA_2
+        ),
         controller={"kind": "pid", "crossover": f"{crossover} Hz", "alpha": orbits.ALPHA, "beta": orbits.BETA},
         motion={"kind": "release", "displacement": "2 mm", "duration": "20 s"},
     )

@@ -5,8 +5,6 @@ MuJoCo takes speed as constant over a step and solves the bristles' equation exa
 steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module

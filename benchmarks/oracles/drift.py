@@ -3,15 +3,13 @@
 LuGre's bristles creep; elasto-plastic ones do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import friso
-from benchmarks.oracles.oracle import Finding, Oracle, number
+from benchmarks.oracles.oracle import Finding, Oracle, lugre, number
 from friso.stage import Stage
 
 MASS, STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 1.7, 3.0, 1.0, 1.6e-3, 1e5, np.sqrt(1e5), 0.5
@@ -33,18 +31,8 @@ SCALES = np.array([1e-5, 1e-3, 1e-5])
 
 def stage(law: str) -> Stage:
     """Return the mass under the load as a stage; its dither is the oscillating load."""
-    friction = {
-        "model": law,
-        "static": f"{STATIC} N",
-        "coulomb": f"{COULOMB} N",
-        "stribeck_velocity": f"{STRIBECK} m/s",
-        "stribeck_exponent": 2,
-        "bristle_stiffness": f"{SIGMA_0!r} N/m",
-        "bristle_damping": f"{float(SIGMA_1)!r} N*s/m",
-        "viscous": f"{SIGMA_2} N*s/m",
-    }
-    if law == "elasto_plastic":
-        friction["breakaway_deflection"] = f"{BREAKAWAY} m"
+    others = {"breakaway_deflection": f"{BREAKAWAY} m"} if law == "elasto_plastic" else {}
+    friction = lugre(STATIC, COULOMB, STRIBECK, SIGMA_0, float(SIGMA_1), SIGMA_2, model=law, **others)
     return Stage(
         name=f"drift, {law}",
         masses={"cart": f"{MASS} kg"},

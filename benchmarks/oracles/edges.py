@@ -5,8 +5,6 @@ from a separate seed; results are in `edges.jsonl`, a line for each stage. Friso
 `independent.py` asks friso about its stages.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Compare friso's verdicts and edges with those of brute force (`edges.py`), class by class."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,9 +1,8 @@
 """Define an oracle: a fact with its source, and friso's answers beside those of others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 
 class NotInstalled(Exception):
@@ -45,3 +44,20 @@ def number(
     agrees = bool(abs(friso - oracle) <= max(rtol * abs(oracle), atol))
     one, other = (f"{value:.{digits}g} {unit}".strip() for value in (friso, oracle))
     return Finding(what, one, other, agrees)
+
+
+def lugre(
+    static: float, coulomb: float, stribeck: float, stiffness: float, damping: float, viscous: float, **others: Any
+) -> dict[str, Any]:
+    """Return a table of LuGre friction, or of a law with its keys, from SI values of a linear axis."""
+    return {
+        "model": "lugre",
+        "static": f"{static!r} N",
+        "coulomb": f"{coulomb!r} N",
+        "stribeck_velocity": f"{stribeck!r} m/s",
+        "stribeck_exponent": 2,
+        "bristle_stiffness": f"{stiffness!r} N/m",
+        "bristle_damping": f"{damping!r} N*s/m",
+        "viscous": f"{viscous!r} N*s/m",
+        **others,
+    }

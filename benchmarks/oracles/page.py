@@ -1,7 +1,5 @@
 """Write the page of oracles: a table of all, and a section for each."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from datetime import date

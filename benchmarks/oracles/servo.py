@@ -1,7 +1,5 @@
 """Compare with the servo of the LuGre paper, which hunts only with its integral gain."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 
@@ -9,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import friso
-from benchmarks.oracles.oracle import Finding, Oracle, number
+from benchmarks.oracles.oracle import Finding, Oracle, lugre, number
 from friso.hunting import check_given
 from friso.stage import Stage
 
@@ -28,16 +26,7 @@ def stage(ki: float = KI) -> Stage:
     return Stage(
         name="LuGre servo",
         masses={"cart": "1 kg"},
-        friction={
-            "model": "lugre",
-            "static": f"{STATIC} N",
-            "coulomb": f"{COULOMB} N",
-            "stribeck_velocity": f"{STRIBECK} m/s",
-            "stribeck_exponent": 2,
-            "bristle_stiffness": f"{SIGMA_0!r} N/m",
-            "bristle_damping": f"{float(SIGMA_1)!r} N*s/m",
-            "viscous": f"{SIGMA_2} N*s/m",
-        },
+        friction=lugre(STATIC, COULOMB, STRIBECK, SIGMA_0, float(SIGMA_1), SIGMA_2),
         controller={
             "kind": "pid",
             "kp": f"{KP} N/m",

@@ -11,8 +11,6 @@ statements are from
 - Ruderman, arXiv 2311.03724 and 2006.08977: with Coulomb friction alone there is none, but stops ever closer by.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,7 +19,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import root_scalar
 
-from benchmarks.oracles.oracle import Finding, Oracle
+from benchmarks.oracles.oracle import Finding, Oracle, lugre
 from friso.hunting import Ensemble, Hunting, find_cycles, find_swings, hunting
 from friso.stage import Stage
 
@@ -136,16 +134,8 @@ def stage(pid: Pid, sharpness: float, gap: float = GAP) -> Stage:
     """Return the mass with LuGre friction; a smaller `sharpness` is nearer to the limit."""
     top = gap / (MASS * pid.omega) if gap else 1e-3
     bristles = pid.kp * max(1e3, sharpness**-2)
-    friction = {
-        "model": "lugre",
-        "static": f"{COULOMB + gap} N",
-        "coulomb": f"{COULOMB} N",
-        "stribeck_velocity": f"{sharpness * top!r} m/s",
-        "stribeck_exponent": 2,
-        "bristle_stiffness": f"{bristles!r} N/m",
-        "bristle_damping": f"{float(np.sqrt(bristles * MASS))!r} N*s/m",
-        "viscous": "0 N*s/m",
-    }
+    damping = float(np.sqrt(bristles * MASS))
+    friction = lugre(COULOMB + gap, COULOMB, sharpness * top, bristles, damping, 0.0)
     return Stage(
         name="towards the limit",
         masses={"cart": f"{MASS} kg"},

@@ -1,18 +1,15 @@
 """Compare the check with the search alone, without return maps.
 
-Run by `python -m benchmarks.return_map`. Stages are drawn from three series, or are the hard stages of the suite
-(`--series hard`) or the thesis rig (`--series rig`). Both methods answer each case. Answers are kept in a file, a line
-each, and a run continues where one was stopped. `--table` writes the page [The check against the search
+Run by `python -m benchmarks.return_map`. Stages are drawn from three series, or come from the tests' book of machines
+(`--series hard`), or are the thesis rig (`--series rig`). Both methods answer each case. Answers are kept in a file, a
+line each, and a run continues where one was stopped. `--table` writes the page [The check against the search
 alone](return-map.md).
 """
-
-from __future__ import annotations
 
 import argparse
 import json
 import os
 import sys
-import tomllib
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
@@ -32,9 +29,8 @@ from friso.engine.kernel import kernels
 from friso.hunting import ReturnMapSettings, needed_kernels
 from friso.stage import Stage
 
-HARD = Path(__file__).parents[2] / "tests" / "hard_stages.toml"
-ABOUT_HARD = ("name", "attracts", "own_motion", "evidence")
-"""Entries of the hard stages that do not belong to the stage file."""
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from book import BOOK, knowing
 
 
 def main() -> None:
@@ -71,10 +67,8 @@ def _stage(series: str, seed: int, number: int) -> Stage | None:
         return draw(seed, number, series)
     if series == "rig":
         return friso.load(friso.example("thesis_rig")) if number == 0 else None
-    entries = tomllib.loads(HARD.read_text(encoding="utf-8"))["stages"]
-    if number >= len(entries):
-        return None
-    return Stage(**{key: value for key, value in entries[number].items() if key not in ABOUT_HARD})
+    names = knowing("attracts")
+    return BOOK[names[number]] if number < len(names) else None
 
 
 def _answered(record: dict[str, Any], stage: Stage, before: dict[str, Any] | None) -> dict[str, Any]:

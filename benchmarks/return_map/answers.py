@@ -1,7 +1,5 @@
 """Convert a check's results to data, by the return map or by the search alone."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

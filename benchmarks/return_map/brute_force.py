@@ -3,8 +3,6 @@
 Runs are followed as the adversary (`benchmarks.truth`) follows them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compare the check with the search alone by class of machine, as a Markdown page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

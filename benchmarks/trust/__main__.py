@@ -5,8 +5,6 @@ its seed, and the number of the case. The work is bounded in count (`--cases` fo
 fraction of it for heavier ones) and in time (`--minutes` in all).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -4,8 +4,6 @@ They are of other types, empty, thousands of characters long, or out of range. T
 clear message with nothing written. Nothing is computed.
 """
 
-from __future__ import annotations
-
 import inspect
 import random
 import sys
@@ -55,26 +53,6 @@ CALLS: dict[str, dict[str, Any]] = {
 }
 """Valid arguments of every public function."""
 
-LINES: dict[str, list[str]] = {
-    **{name: [name, RIG] for name in ("bode", "check", "simulate", "tune")},
-    "app": ["app", RIG, "--no-browser"],
-    "boundary": ["boundary", RIG, "--x", "controller.crossover=4 Hz..8 Hz"],
-    "compare": ["compare", DRIVE, "--machines", "20"],
-    "design": ["design", RIG, SPEC],
-    "doctor": ["doctor"],
-    "example": ["example", "thesis_rig"],
-    "export": ["export", RIG],
-    "flexure": ["flexure", LEAVES],
-    "guideline": ["guideline"],
-    "identify": ["identify", "log.csv"],
-    "init": ["init", "new.toml"],
-    "logs": ["logs", "log.csv"],
-    "map": ["map", RIG, "--x", "controller.crossover=2 Hz..16 Hz:3"],
-    "reproduce": ["reproduce"],
-    "rig": ["rig", "stiffness", DRIVE],
-    "schema": ["schema"],
-}
-"""A valid line of every command."""
 
 _LONG = ("x" * 201, "x" * 256, "x" * 5000, "x/" * 700, "9" * 400, "9" * 5000, "a." * 10_000, "[" * 3000)
 TEXTS = (
@@ -125,9 +103,10 @@ def arguments(rng: random.Random, folder: Path) -> None:
 
 def options(rng: random.Random, folder: Path) -> None:
     """Replace or add one argument or option of a command."""
-    name = rng.choice([*LINES])
-    line, text = [*LINES[name]], rng.choice(TEXTS).replace("\0", "")
-    valued = _valued_options()[name]
+    valued_options = _valued_options()
+    name = rng.choice([*valued_options])
+    valued = valued_options[name]
+    line, text = line_of(name, valued), rng.choice(TEXTS).replace("\0", "")
     place = rng.randrange(len(line) + 2 * len(valued))
     if 0 < place < len(line):
         line[place] = text
@@ -147,6 +126,16 @@ def options(rng: random.Random, folder: Path) -> None:
         if status == 2:
             assert_clear(what, err)
             assert _tree(folder) == before, f"{what}: refused, but wrote {_tree(folder) - before}"
+
+
+def line_of(name: str, valued: list[str]) -> list[str]:
+    """Return a valid line of a command, some of whose options take a value."""
+    if name == "app":
+        return [name, RIG, "--no-browser"]
+    words = [name]
+    for key, value in CALLS["sweep" if name == "map" else name].items():
+        words += [f"--{key}", str(value)] if f"--{key}" in valued else [str(value)]
+    return words
 
 
 def _run(line: list[str]) -> tuple[int, str]:

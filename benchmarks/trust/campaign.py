@@ -3,8 +3,6 @@
 Each case follows from the seed, the campaign and its number, so that it can be repeated alone.
 """
 
-from __future__ import annotations
-
 import io
 import logging
 import random

@@ -3,8 +3,6 @@
 They are killed, interrupted, short of disk, run two at once, or lose their workers.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import shutil
@@ -56,8 +54,6 @@ WRITING: dict[str, list[str]] = {
 }
 """All commands that write."""
 
-ONE_FILE = {name for name, line in WRITING.items() if line[0] in ("init", "example")}
-"""Commands that write one file and no folder."""
 
 LONGEST = 8.0
 """Longest time [s] after its start at which a command is killed or interrupted."""

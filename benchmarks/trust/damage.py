@@ -1,7 +1,5 @@
 """Damage files at random, as disks, editors and hostile people do."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 Python reports each operation before it happens (`sys.addaudithook`).
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import random

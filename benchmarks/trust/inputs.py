@@ -1,7 +1,5 @@
 """Provide inputs for the campaigns' commands: friso's examples, and a log."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager

@@ -3,8 +3,6 @@
 Each question must be answered, or refused in one clear message. Nothing is computed.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from pathlib import Path

@@ -3,8 +3,6 @@
 The function may refuse the file with an InputError and must do nothing else.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

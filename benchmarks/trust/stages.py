@@ -4,8 +4,6 @@ Tables, kinds and keys are random, with the values of the schema's examples. Con
 says, or left out. Every function must accept such a stage, or refuse it in one clear message.
 """
 
-from __future__ import annotations
-
 import random
 import re
 import signal

@@ -3,8 +3,6 @@
 No command is started and nothing simulated: a case takes milliseconds.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

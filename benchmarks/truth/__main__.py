@@ -6,8 +6,6 @@ others are not certain. Attacks are kept in a file, and a run continues where on
 prints what there is. `--number` takes single stages of a seed; `--checks` only checks them, and keeps nothing.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import multiprocessing

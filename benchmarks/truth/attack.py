@@ -1,7 +1,5 @@
 """Draw, check and attack one stage, and record it for a file."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """Collect what `friso check` says about a stage, as far as it can be refuted."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 A stage belongs to one law, one joint and one controller, and to each further class that fits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ It is asked whether they close, how large they are, and how a deviation grows. S
 tolerances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

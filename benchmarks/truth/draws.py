@@ -4,8 +4,6 @@ Numbers are log-uniform over realistic ranges. A numbered stage does not depend 
 from a pool, each of whose members is a kernel to compile: numbers that differ by the size of the pool share one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count, islice

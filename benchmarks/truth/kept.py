@@ -1,7 +1,5 @@
 """Keep attacks in a file, a line of JSON each, so that later runs continue."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable

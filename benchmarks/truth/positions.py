@@ -3,8 +3,6 @@
 SciPy solves the equations written by hand.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -5,8 +5,6 @@ Before a claim is called wrong the attack looks closer. A swing that should not 
 (`may_attract`), at two tolerances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Test verdicts by SciPy alone, with equations by hand: own motion and some releases."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

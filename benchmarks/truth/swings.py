@@ -6,8 +6,6 @@ its edge takes hundreds of swings to leave or to reach. So legs of the last quar
 quarter before, and if that does not decide, the run is followed longer.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Count what attacks show, in total and by class of machine, as data, text and Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

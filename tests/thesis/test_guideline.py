@@ -51,9 +51,6 @@ from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, E
 from friso_thesis.studies.guideline.worked import ParasiticLimits, holding, plain_rig
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-RIGID = pytest.mark.xdist_group("rigid")
-FREE_RIG = pytest.mark.xdist_group("free")
-
 
 def rigid() -> Stage:
     return VARIANTS["rigid"]
@@ -124,7 +121,6 @@ def test_groups_and_back() -> None:
 
 
 @pytest.mark.slow
-@RIGID
 @settings(max_examples=8)
 @given(*[st.floats(-3, 3)] * 3)
 def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: float) -> None:
@@ -134,7 +130,6 @@ def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: flo
     assert multiplier(scaled) == pytest.approx(multiplier(flat_of(values)), rel=1e-5)
 
 
-@FREE_RIG
 def test_equal_groups_equal_multiplier_with_a_free_joint() -> None:
     """The groups of the parasitic mode, which `flat_of` leaves out, do so as well."""
     values = values_of(free_rig().replace({"controller.crossover": "3 Hz"}).flat())
@@ -159,7 +154,6 @@ def edge_of(chosen: Stage, low: float, high: float, points: int) -> Edges:
     )
 
 
-@RIGID
 def test_edge_of_the_rigid_mass() -> None:
     """The edge is a flip at 9.77 Hz (references.md); an edge outside the grid is reported as such."""
     edge = edge_of(rigid(), 5, 20, 6)
@@ -172,7 +166,6 @@ def test_edge_of_the_rigid_mass() -> None:
     assert not edge_of(rigid(), 18, 30, 3).located[0]
 
 
-@FREE_RIG
 def test_edge_of_the_free_rig() -> None:
     """5.60 Hz (docs/hunting.md); 0.05 for the limiter that chatters."""
     edge = edge_of(free_rig(), 4, 9, 5)
@@ -206,7 +199,6 @@ def swept(values: dict[str, np.ndarray]) -> Edges:
 
 
 @pytest.mark.slow
-@RIGID
 def test_simulation_agrees_where_hunting_ends() -> None:
     """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz; at a gap of 0.12 one
     swings by less than a tenth of the deflection by the break-away force, which is seen as well."""
@@ -223,7 +215,6 @@ def test_simulation_agrees_where_hunting_ends() -> None:
 
 
 @pytest.mark.slow
-@RIGID
 def test_edge_stays_where_simulations_settle_above() -> None:
     """A cycle that repels far above does not tell of the edge."""
     runs = swept(FAR_FLIP)
@@ -232,7 +223,6 @@ def test_edge_stays_where_simulations_settle_above() -> None:
 
 
 @pytest.mark.slow
-@RIGID
 def test_jump_is_told_apart_and_followed() -> None:
     runs = swept(JUMPS)
     assert runs.kind[0] == JUMP
@@ -433,10 +423,8 @@ def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline)
     """
     damped, light = quick.parasitic
     assert [(item.frequency, item.damping_ratio) for item in (damped, light)] == [(300, 0.01), (300, 0.001)]
-    assert damped.locked is not None
     assert damped.locked[1] == pytest.approx(69.9, rel=0.01)
     assert damped.free == pytest.approx((3.82, 14.2), rel=0.01)
-    assert light.locked is not None
     assert 300 / light.locked[1] == pytest.approx(15.5, rel=0.01)
     assert light.free is None
 

@@ -22,8 +22,6 @@ from friso_thesis.studies.thesis.linear import analysed
 from friso_thesis.studies.thesis.linear.plants import limit_cases_of
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-pytestmark = pytest.mark.xdist_group("identify-experiments")
-
 
 def judged(claim: str) -> Finding:
     """Return the judge's finding from the experiments that the claim needs, and no others."""

@@ -24,8 +24,6 @@ from friso_thesis.studies.thesis.linear.plants import LowLines, Springs, absciss
 from friso_thesis.studies.thesis.space import OPEN
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-pytestmark = pytest.mark.xdist_group("linear-claims")
-
 
 @pytest.fixture(scope="module")
 def linear() -> Linear:
@@ -135,7 +133,6 @@ def test_limit_cases_against_closed_forms(linear: Linear) -> None:
     assert plants["sliding"].first == pytest.approx(13.12, rel=1e-3)
     assert plants["stuck"].first == pytest.approx(np.sqrt(2343.75 / 0.5) / (2 * np.pi), rel=2e-3)
     pair = plants["sliding-touched"].pair_above
-    assert pair is not None
     assert pair[0] == pytest.approx(np.sqrt(2e7 / 1.2) / (2 * np.pi), rel=1e-3)
     assert pair[1] == pytest.approx(np.sqrt(2e7 * (1 / 1.2 + 1 / 0.25)) / (2 * np.pi), rel=0.01)
     for case in ("stuck-touched", "sliding-touched"):
@@ -171,13 +168,11 @@ def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
     for crossover, delay in loops.delay_at.items():
         assert rightmost(crossover, 0.99 * delay) < 0 < rightmost(crossover, 1.01 * delay)
     for delay, crossover in loops.sampled.items():
-        assert crossover is not None
         assert rightmost(0.999 * crossover, delay) < 0 < rightmost(1.001 * crossover, delay)
 
 
 def test_the_crossover_from_which_a_mode_reaches_0_db(linear: Linear) -> None:
     settings = {f: len(cases["sliding"].crossovers) for f, cases in linear.locked.margins.items()}
-    assert linear.locked.single is not None
     assert all((count == 1) == (f < linear.locked.single) for f, count in settings.items())
     assert linear.free.single == pytest.approx(linear.locked.single, rel=1e-3)
 

@@ -78,7 +78,6 @@ def module(name: str) -> Any:
 
 REPRODUCE = module("reproduce")
 
-pytestmark = pytest.mark.xdist_group("reproduction")
 
 TABLE_3 = {
     "path": {"motion.acceleration": (0, 150), "motion.acceleration_time": (0, 0.15)},
@@ -447,14 +446,12 @@ def test_a_number_beside_its_threshold_is_undecided() -> None:
 def test_the_count_judges_and_what_attracts_stands_beside() -> None:
     item = verdict(claims()[0], "1", finding(True, True), finding(True, False))
     assert item.judgement == "holds"
-    assert item.attracts is not None
     assert item.attracts.judgement == "holds in part"
 
 
 def test_the_interval_of_the_share_decides_the_word(thorough_study: Reproduction) -> None:
     """One rule for all claims, with intervals that hold at three looks together."""
     space = next(item.space for item in thorough_study.verdicts if item.space and item.space.draws == 2)
-    assert space is not None
 
     def of_draws(held: int, draws: int) -> Any:
         flags = np.arange(draws) < held
@@ -861,7 +858,6 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     ]
     crossover = np.interp(1.7, *np.array(sorted((y, x) for x, y in near)).T)
     edge = find_margin(study.stage(), attracting=True)
-    assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
     shown = replace(thorough_study, cycles={"system": cycles_})
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
@@ -880,7 +876,6 @@ def test_kept_arrays_are_whole_and_no_larger(tmp_path: Path, monkeypatch: pytest
     file, arrays = tmp_path / "0.npz", {"peaks": np.ones(5), "outcome": np.full(5, "rests")}
     keep_arrays(file, arrays)
     whole = kept_arrays(file)
-    assert whole is not None
     assert {name: values.tolist() for name, values in whole.items()} == {
         name: values.tolist() for name, values in arrays.items()
     }

@@ -74,7 +74,6 @@ def test_200_newtons_are_8_g_with_the_mass_identified_and_100_m_s2_take_250() ->
     parts, table = finding.parts, finding.table
     assert [part.holds for part in parts] == [Y]
     assert "8.2 g with 2.5 kg" in parts[0].number
-    assert table is not None
     assert table.rows[1][:2] == ("2.5 kg", "250 N")
 
 

@@ -16,8 +16,6 @@ from friso_thesis.studies.thesis.evidence import run_response
 from friso_thesis.studies.thesis.linear import Linear, analysed
 from friso_thesis.studies.thesis.studies import LOCKED, thesis_rig
 
-pytestmark = pytest.mark.xdist_group("linear-claims")
-
 CART, STAGE, JOINT, DAMPING = 1.2, 0.5, 2.4e3, 0.5
 """Masses [kg], stiffness [N/m] and damping [N s/m] of the joint (Sec. 3.5, 4.2.1; the damping is friso's choice)."""
 
