@@ -131,6 +131,29 @@ def test_a_module_is_a_room() -> None:
     assert imports / sum(sizes) < 0.102
 
 
+NUMBERS_NOT_MOVED = ("hunting/", "identification/")
+"""Rooms whose numbers are settings still."""
+
+
+def test_a_number_that_nobody_changes_is_a_constant() -> None:
+    """A setting is given another value by a test, a benchmark or a command; other numbers stand above their use."""
+    users = [path for folder in ("tests", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
+    calls = [
+        (ast.unparse(node.func).split(".")[-1], {keyword.arg for keyword in node.keywords})
+        for text in (*sources().values(), *(path.read_text(encoding="utf-8") for path in users))
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call)
+    ]
+    wrong = []
+    for name, text in sources().items():
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.ClassDef) and "Settings" in map(ast.unparse, node.bases):
+                changed = set().union(*(given for called, given in calls if called in (node.name, "replace")))
+                names = [ast.unparse(item.target) for item in node.body if isinstance(item, ast.AnnAssign)]
+                wrong += [f"{name}: {setting}" for setting in names if setting not in changed]
+    assert [name for name in wrong if not name.startswith(NUMBERS_NOT_MOVED)] == []
+
+
 def test_no_modules_import_each_other_in_a_circle() -> None:
     """A circle of imports, also one of types alone, is one module in several files."""
     graph = grimp.build_graph("friso", "friso_thesis", cache_dir=None)
