@@ -614,3 +614,16 @@ def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupli
     """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
     case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)
     assert not "".join(one.words for find in (delay.find_delay, forces.find_coupling) for one in find(case))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-4])
+@pytest.mark.parametrize(("amplitude", "raised"), [(20e-6, True), (2e-3, False)])
+def test_a_coarse_position_is_coarse_on_an_evened_clock_too(jitter: float, amplitude: float, raised: bool) -> None:
+    """Interpolation to an even clock makes steps of nanometres of steps of a micrometre."""
+    time, random = 1e-3 * np.arange(4000), np.random.default_rng(1)
+    at = time + jitter * (random.random(time.size) - 0.5)
+    position = np.interp(time, at, 1e-6 * np.round(amplitude * np.sin(np.pi * at) / 1e-6))
+    push = np.sign(np.cos(np.pi * time)) - 500 * amplitude * np.pi**2 * np.sin(np.pi * time)
+    log = record("moves", 1e-3, position=position, force=push)
+    doubts = [*DOUBTS["position-digits"].find(RecordCase(log, inverse_model(log)))]
+    assert [doubt.size for doubt in doubts] == pytest.approx([1e-6] * raised)

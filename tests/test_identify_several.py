@@ -1,6 +1,8 @@
 """Several logs: one event each, a controller of their own, and predictions refused before anything is fitted."""
 
+from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +13,15 @@ import friso
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import as_set_up
 from friso.identification.kinds import KINDS
+from friso.identification.logs import read
+from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import Log, join_logs
+from friso.identification.logs.roles import Mapping
 from friso.identification.method import check_predictions, identify
 from friso.identification.readings.common import record
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.sources import read_all
 from friso.stage import Stage
 
 
@@ -167,3 +173,24 @@ def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage)
     ):
         with refused(key):
             check_predictions(logs, [predicted], stage)
+
+
+def test_each_file_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many options name its channels, and whether or not questions stay open."""
+    parsed: Counter[Path] = Counter()
+
+    def counted(form: read.LogFormat) -> read.LogFormat:
+        return replace(form, read=lambda path: parsed.update([path]) or form.read(path))
+
+    monkeypatch.setattr(read, "FORMATS", {name: counted(read.FORMATS[name]) for name in read.FORMATS})
+    paths = [tmp_path / f"{name}.csv" for name in "abc"]
+    rows = "".join(f"{i / 1000},{np.sin(i / 50):.6f},{np.cos(i / 50):.6f}\n" for i in range(1000))
+    for path in paths:
+        path.write_text(f"t [s],ActPos,Drive\n{rows}")
+    mapping = Mapping({"position": "ActPos", "force": "Drive"}, units={"ActPos": "mm"})
+    with pytest.raises(GapsError):  # the unit of the force is open
+        read_all(paths, mapping, tmp_path)
+    assert parsed == dict.fromkeys(paths, 1)
+    parsed.clear()
+    read_all(paths, replace(mapping, units={"ActPos": "mm", "Drive": "N"}, experiment="moves"), tmp_path)
+    assert parsed == dict.fromkeys(paths, 1)

@@ -7,8 +7,9 @@ reasons, and open questions.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,6 @@ from friso.identification.logs.read import (
     is_frequency_response,
     read_file,
     read_frequency_response,
-    read_table,
 )
 from friso.identification.logs.roles import (
     SUFFIX,
@@ -109,16 +109,16 @@ def read_usable(
     files: list[LogFile] = []
     gaps: dict[tuple[str, ...], list[GapsError]] = {}
     wrong: list[InputError] = []
-    everything = [*paths, *others]
-    holders = _holders(options, everything) if len(everything) > 1 else {}
+    read = cache(read_file)  # of one call: the next one finds a file that has changed
+    holders = _holders(options, [*paths, *others], read) if len(paths) + len(others) > 1 else {}
     for number, path in enumerate(paths):
         mapping = options if is_frequency_response(path) else _applicable(options, number, holders)
         try:
-            file = _read(path, mapping, folder)
+            file = _read(path, mapping, folder, read)
             files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
         except GapsError as error:
             first, *more = error.gaps
-            alike = tuple(channel.name for channel in read_table(path).channels)
+            alike = tuple(channel.name for channel in read(path).table.channels)
             gaps.setdefault(alike, []).append(GapsError([_mentioning_kept(first, path, mapping, folder), *more]))
         except InputError as error:
             wrong.append(_mentioning_kept(error, path, mapping, folder))
@@ -214,9 +214,9 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     return replace(file, source=file.source.per_unit_of_force())
 
 
-def _holders(options: Mapping, paths: Sequence[Path]) -> dict[str, list[bool]]:
+def _holders(options: Mapping, paths: Sequence[Path], read: Callable[[Path], ReadFile]) -> dict[str, list[bool]]:
     """Tell for each channel in the options which of the files have it."""
-    return {name: [_has(path, name) for path in paths] for name in {*options.roles.values(), *options.units}}
+    return {name: [_has(path, name, read) for path in paths] for name in {*options.roles.values(), *options.units}}
 
 
 def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) -> Mapping:
@@ -234,18 +234,18 @@ def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) ->
     return replace(options, roles=roles, units=units, scales=scales)
 
 
-def _has(path: Path, name: str) -> bool:
+def _has(path: Path, name: str, read: Callable[[Path], ReadFile]) -> bool:
     """Tell whether a file has a channel of this name."""
     if is_frequency_response(path):
         return False
     try:
-        find(read_table(path), name, "")
+        find(read(path).table, name, "")
     except InputError:
         return False
     return True
 
 
-def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
+def _read(path: Path, options: Mapping, folder: Path, read: Callable[[Path], ReadFile]) -> LogFile:
     """Read a file, mapped by the options and, beyond them, by its stored mapping."""
     if is_frequency_response(path):
         kind = next(name for name in KINDS if KINDS[name].responses)
@@ -260,7 +260,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         if None in (mapping.experiment, stored.experiment) or stored.experiment == mapping.experiment
         else f", in place of {stored.experiment} as kept"
     )
-    log, kind, reason = named(read_file(path), mapping)
+    log, kind, reason = named(read(path), mapping)
     return LogFile(path, log, kind, f"{reason}{before}", mapping, **said)
 
 

@@ -57,13 +57,14 @@ def _force_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _position_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the travel with the smallest step of the position.
+    """Compare the travel with the resolution of the position, or with its smallest step if no resolution shows.
 
-    A coarse resolution turns into noise of the acceleration, and hides the deflection of bristles.
+    A coarse resolution turns into noise of the acceleration, and hides the deflection of bristles. Interpolation to an
+    even clock makes smaller steps, and leaves the resolution.
     """
     position = case.log["position"][case.log.longest]
     steps = np.abs(np.diff(position))
-    digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
+    digit, travel = digit_of(position) or float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
     if digit * doubt_settings.digits_of_a_fine_position >= travel:
         words = f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
         yield RaisedDoubt(words=words, size=digit, unit="m")
@@ -190,7 +191,7 @@ ABOUT_RECORDS: dict[str, tuple[Doubt, str]] = {
         "Doubt: gaps leave little of the record to fit",
     ),
     "position-digits": (
-        Doubt("fault", _position_digits, "the smallest step of the position beside its travel", "reported",
+        Doubt("fault", _position_digits, "the resolution of the position beside its travel", "reported",
               "a log with more digits", after=("position-jump",)),
         "Doubt: the resolution of the position is coarse compared with its travel",
     ),

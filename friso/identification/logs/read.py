@@ -404,8 +404,7 @@ def read_table(path: Path | str) -> ChannelTable:
 
     Raises LogError for a file of unknown format, or one that its format cannot read.
     """
-    with _plain(path) as plain:
-        return FORMATS[_plain_format(plain)].read(plain)
+    return read_file(path).table
 
 
 @dataclass(frozen=True)
@@ -453,7 +452,9 @@ def read_file(path: Path | str) -> ReadFile:
 
     Raises LogError as `read_table` does.
     """
-    return ReadFile(Path(path), FORMATS[file_format(Path(path))], read_table(path))
+    with _plain(path) as plain:
+        form = FORMATS[_plain_format(plain)]
+        return ReadFile(Path(path), form, form.read(plain))
 
 
 def glance(path: Path) -> ReadFile:
