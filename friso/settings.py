@@ -18,22 +18,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar, Self, cast
-
-
-def setting(value: Any, unit: str) -> Any:
-    """Declare a field of a Settings class; the text below the field is the reason for its value.
-
-    Parameters
-    ----------
-    value
-        The value that friso uses.
-    unit : str
-        Its unit, "s" or "N/m"; "" for a number without one.
-    """
-    return field(default=value, metadata={"unit": unit})
 
 
 class Settings:

@@ -13,8 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 import friso
 from friso.engine.batch import run_driven
 from friso.identification.logs.log import Log
-from friso.identification.output_error.problem import loop_problem
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.problem import RUN_TOLERANCE, loop_problem
 from friso.identification.readings.common import record
 
 FIXED = 1e9
@@ -95,7 +94,7 @@ class Machine:
         signals = {"reference": reference, "position": result.position, "force": result.force}
         if self.jointed:
             starts = np.zeros((1, len(problem.kernel.full_state)))
-            tolerance = OutputErrorSettings.current().run_tolerance
+            tolerance = RUN_TOLERANCE
             (runs,) = run_driven(problem.kernel, flat, 1, problem.inputs, starts, tolerance)
             signals["cart_position"] = runs.states[0, :, problem.kernel.states.index("cart_position")]
         return self.measured(record(name, self.sample_time, **{k: v[::FINE] for k, v in signals.items()}), bare)

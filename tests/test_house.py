@@ -131,10 +131,6 @@ def test_a_module_is_a_room() -> None:
     assert imports / sum(sizes) < 0.102
 
 
-NUMBERS_NOT_MOVED = ("hunting/", "identification/")
-"""Rooms whose numbers are settings still."""
-
-
 def test_a_number_that_nobody_changes_is_a_constant() -> None:
     """A setting is given another value by a test, a benchmark or a command; other numbers stand above their use."""
     users = [path for folder in ("tests", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
@@ -151,7 +147,7 @@ def test_a_number_that_nobody_changes_is_a_constant() -> None:
                 changed = set().union(*(given for called, given in calls if called in (node.name, "replace")))
                 names = [ast.unparse(item.target) for item in node.body if isinstance(item, ast.AnnAssign)]
                 wrong += [f"{name}: {setting}" for setting in names if setting not in changed]
-    assert [name for name in wrong if not name.startswith(NUMBERS_NOT_MOVED)] == []
+    assert wrong == []
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:

@@ -23,11 +23,10 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, t_value
-from friso.identification.readings.course import Course
+from friso.identification.readings.course import FEWEST_RAMPS, Course
 from friso.identification.readings.friction_position import friction_position
-from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS, friction_velocity
 from friso.identification.readings.motion_events import break_away, force_ramps, share_below, static_friction
-from friso.identification.readings.settings import ReadingSettings
 from friso.identification.response.modes import ResponseFit
 from friso.identification.sources import recognised
 from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
@@ -416,7 +415,7 @@ def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, 
     rng = np.random.default_rng(8)
     position, force = (np.asarray(run[name])[round(15 / DT) :] for name in ("position", "force"))
     log = record("hunting", DT, position=measured(position, 1e-7, rng), force=measured(force, 0.05, rng))
-    assert len(force_ramps(log).forces) > ReadingSettings.current().fewest_ramps
+    assert len(force_ramps(log).forces) > FEWEST_RAMPS
     assert Course(log).ramps == 0
     assert recognised(log, Path("log.csv"))[0] == "moves"
 
@@ -526,7 +525,7 @@ def test_what_lies_within_the_linearity_of_sensors_is_not_seen() -> None:
     assert curve.stribeck_velocity.holds(5e-3)
     for estimate, truth in ((curve.coulomb, 1.0), (curve.static, 1.5)):
         assert estimate.holds(truth)
-        assert estimate.half_width > ReadingSettings.current().linearity_of_sensors * truth
+        assert estimate.half_width > LINEARITY_OF_SENSORS * truth
 
 
 def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:

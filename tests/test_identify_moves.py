@@ -18,6 +18,7 @@ from friso.identification import moves as moves_analysis
 from friso.identification.doubt import DOUBTS, FitCase, Quality, RaisedDoubt, RecordCase, leading_effect
 from friso.identification.doubts import forces
 from friso.identification.doubts import record as delay
+from friso.identification.doubts.forces import PLAYS_TRIED
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model, moved_in
 from friso.identification.logs.assemble import integrated
@@ -40,12 +41,19 @@ from friso.identification.output_error.identifiable import (
     with_force_settled,
     with_smoothness_settled,
 )
-from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
+from friso.identification.output_error.parameters import (
+    BRISTLES,
+    EXPONENT,
+    HIGHEST_FRICTION_RATIO,
+    MASS,
+    RATIO,
+    SHORTEST_BRISTLE_BEND,
+    fit_parameters,
+)
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import record
-from friso.identification.settings import DoubtSettings
 from friso.identification.stage_file import made_up
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
@@ -412,7 +420,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound
     assert {*doubt.refuses} == {*BRISTLES}
     assert abs(mass_off(fitted)) < reach(doubt)[0]
     if effect == "play":  # as wide as any that is tried, it is something slower
-        tried = replace(case.leading.tried, label=max(DoubtSettings.current().plays_tried))
+        tried = replace(case.leading.tried, label=max(PLAYS_TRIED))
         (nameless,) = forces.find_play(replace(case, leading=replace(case.leading, tried=tried)))
         assert not nameless.words
         assert not nameless.explains
@@ -583,11 +591,10 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves)
     coulomb, static = by_name["friction.coulomb"], by_name["friction.static"]
     assert re.search(r"between 0\.0\d+ and 41\.5 mm/s", static.reason)
     assert coulomb.low - 1e-9 < static.low < coulomb.value  # Coulomb friction may be less than its value as well
-    settings = OutputErrorSettings.current()
-    highest = settings.highest_friction_ratio
+    highest = HIGHEST_FRICTION_RATIO
     assert highest * coulomb.value < static.high < 1.02 * highest * coulomb.high
     # all that is believed of bristles, and not what the fit makes of them
-    assert coulomb.value / by_name[BRISTLES[0]].high < 2 * settings.shortest_bristle_bend
+    assert coulomb.value / by_name[BRISTLES[0]].high < 2 * SHORTEST_BRISTLE_BEND
     mass = by_name["masses.cart"]
     assert mass.determined
     assert mass.value == pytest.approx(95.1089, rel=5e-3)

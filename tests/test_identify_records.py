@@ -19,7 +19,7 @@ from friso.identification.moves import IdentifiedMoves
 from friso.identification.output_error.identifiable import IdentifiableFit, coverage
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import record
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.identification.sources import log_with_signals, read_all
 from friso.questions.identify.question import IdentifyAnswer
 
@@ -138,7 +138,6 @@ def test_newtons_of_a_stage_and_moves_too_quick_for_one_are_refused(volts: tuple
 
 @pytest.mark.parametrize(("in_loop", "share"), [(True, 0.0), (False, 0.05)])
 def test_static_friction_is_less_certain_where_the_stage_follows_the_log(in_loop: bool, share: float) -> None:
-    settings = ReadingSettings.current()
     fit = moves(own_loop=in_loop, fitted_in_loop=in_loop)[0].fit
     every = tuple(range(len(fit.inner)))
     sure = replace(fit, free=every, covariance=1e-12 * np.eye(len(every)))
@@ -146,5 +145,5 @@ def test_static_friction_is_less_certain_where_the_stage_follows_the_log(in_loop
     covered = coverage(axis()["position"], motion(axis()["position"], DT, 25.0), MASS, COULOMB, DT)
     estimates = {one.name: one for one in estimates_of(IdentifiableFit(sure, {}, names), covered)[0]}
     static, coulomb = (estimates[f"friction.{name}"] for name in ("static", "coulomb"))
-    assert static.half_width == pytest.approx(max(share, settings.linearity_of_sensors) * static.value, rel=1e-3)
-    assert coulomb.half_width == pytest.approx(settings.linearity_of_sensors * coulomb.value, rel=1e-3)
+    assert static.half_width == pytest.approx(max(share, LINEARITY_OF_SENSORS) * static.value, rel=1e-3)
+    assert coulomb.half_width == pytest.approx(LINEARITY_OF_SENSORS * coulomb.value, rel=1e-3)

@@ -20,8 +20,7 @@ from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.roles import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.method import axis_of_all
-from friso.identification.output_error.parameters import bends
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.parameters import LONGEST_BRISTLE_BEND, SHORTEST_BRISTLE_BEND, bends
 from friso.identification.stage_file import made_up
 
 TURNING = Mapping(axis="rotary")
@@ -111,9 +110,8 @@ def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
     linear, turned = (made_up(one, inverse_model(one, 5.0)) for one in (log, replace(log, axis=ROTARY)))
     assert turned.axis_kind == ROTARY
     assert {key: value for key, value in turned.flat().items() if key != "axis.kind"} == linear.flat()
-    settings = OutputErrorSettings.current()
-    assert bends(linear.axis_kind) == (settings.shortest_bristle_bend, settings.longest_bristle_bend)
-    assert bends(turned.axis_kind)[1] > settings.longest_bristle_bend
+    assert bends(linear.axis_kind) == (SHORTEST_BRISTLE_BEND, LONGEST_BRISTLE_BEND)
+    assert bends(turned.axis_kind)[1] > LONGEST_BRISTLE_BEND
 
 
 def test_logs_and_stage_are_of_one_kind_of_axis_and_unit_of_force(tmp_path: Path) -> None:

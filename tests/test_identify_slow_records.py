@@ -14,8 +14,7 @@ from friso.identification.doubts.values import friction_beyond
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.output_error.to_keys import drawn_from
+from friso.identification.output_error.to_keys import MACHINES_DRAWN, drawn_from
 from friso.identification.readings.common import record
 from friso.identification.readings.motion_events import Ramps
 from friso.identification.stage_file import made_up
@@ -109,7 +108,7 @@ def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
     ]
     inner = np.array([np.log(3.0), np.log(8.0), 1.0, 5.0])
     rows = drawn_from((MASSES, COULOMB, static), np.eye(2), parameters, inner)
-    assert rows.shape == (OutputErrorSettings.current().machines_drawn, 4)
+    assert rows.shape == (MACHINES_DRAWN, 4)
     assert np.ptp(rows[:, 0]) > 0
     assert MASSES.low <= np.exp(rows[:, 0]).min() <= np.exp(rows[:, 0]).max() <= MASSES.high
     assert rows[:, 2].min() < 1.5

@@ -9,12 +9,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from friso.errors import InputError
-from friso.identification.inverse_model import bandwidth_of, inverse_model, motion
+from friso.identification.inverse_model import SMOOTHING_BANDWIDTHS, bandwidth_of, inverse_model, motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import identify_moves
 from friso.identification.output_error.problem import moving
 from friso.identification.readings.common import record
-from friso.identification.settings import identification_settings
 from friso.identification.stage_file import made_up
 
 STROKE = 0.02
@@ -58,7 +57,7 @@ def test_moves_of_any_duration_count_as_motion(shape: str, move: float, dwell: f
     position = position + blur * np.random.default_rng(1).standard_normal(len(position))
     band = bandwidth_of(record("moves", step, position=position))
     assert 0.45 < band * move < 40
-    smooth = motion(position, step, identification_settings.smoothing_bandwidths * band).position
+    smooth = motion(position, step, SMOOTHING_BANDWIDTHS * band).position
     counted, omega = moving(position, smooth, step, band)
     assert counted[moves].mean() > 0.2
     assert 0 < omega <= 2 * np.pi * max(band, 10)

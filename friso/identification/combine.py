@@ -16,11 +16,14 @@ from scipy.stats import t as student
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, t_value
-from friso.identification.settings import identification_settings
 from friso.intervals import NORMAL_COVERAGE
 
 UPPER_PROBABILITY = 0.975
 """Cumulative probability at the upper end of a 95 % interval, for Student's t."""
+
+
+ROW_SHARE_OF_LIKENESS = 0.1
+"""Largest distance of correlated rows, relative to the number of rows."""
 
 
 def correlation_length(residual: np.ndarray) -> int:
@@ -31,13 +34,20 @@ def correlation_length(residual: np.ndarray) -> int:
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
-    correlation = np.fft.irfft(spectrum)[: max(2, int(identification_settings.row_share_of_likeness * count))]
+    correlation = np.fft.irfft(spectrum)[: max(2, int(ROW_SHARE_OF_LIKENESS * count))]
     if correlation[0] <= 0:
         return 1
     correlation = correlation / correlation[0]
     crossing = np.flatnonzero(correlation <= 0)
     last = crossing[0] if crossing.size else len(correlation)
     return max(1, round(2 * correlation[:last].sum() - 1))
+
+
+BLOCKS_OF_TIME = 10
+"""Number of blocks of time within which errors may be correlated."""
+
+BINS_OF_PLACE_AND_SPEED = 20
+"""Number of bins of place, and of speed, within which errors may be correlated. More contain too few rows."""
 
 
 def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -47,9 +57,9 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
     acceleration [m/s^2]. Model errors recur with place and speed, so a repeated motion gives no new information.
     """
     return (
-        np.arange(len(position)) * identification_settings.blocks_of_time // len(position),
-        binned(position, identification_settings.bins_of_place_and_speed),
-        2 * binned(velocity, identification_settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
+        np.arange(len(position)) * BLOCKS_OF_TIME // len(position),
+        binned(position, BINS_OF_PLACE_AND_SPEED),
+        2 * binned(velocity, BINS_OF_PLACE_AND_SPEED) + (velocity * acceleration > 0),
     )
 
 
@@ -95,7 +105,7 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
-    window = min(max(window, 1), max(2, int(identification_settings.row_share_of_likeness * count)))
+    window = min(max(window, 1), max(2, int(ROW_SHARE_OF_LIKENESS * count)))
     return covariance_of_sum(scores, window)
 
 
@@ -111,6 +121,10 @@ def covariance_of_sum(scores: np.ndarray, window: int) -> np.ndarray:
     return total
 
 
+LEAST_FREEDOM_OF_GROUPS = 3.0
+"""Smallest number of degrees of freedom of correlated groups that is assumed (friso's choice)."""
+
+
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Return the covariance of the sum of scores, (n, p), that are correlated within groups.
 
@@ -122,9 +136,13 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
     power = np.bincount(members, (scores**2).sum(axis=1), len(names))
     equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
-    freedom = max(equal - 1, identification_settings.least_freedom_of_groups)
+    freedom = max(equal - 1, LEAST_FREEDOM_OF_GROUPS)
     wider = float(student.ppf(UPPER_PROBABILITY, freedom)) / NORMAL_COVERAGE
     return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
+
+
+EIGENVALUE_OF_LIKENESS = 1e-6
+"""Ratio of an eigenvalue to the largest, below which columns cannot be distinguished."""
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,9 +152,9 @@ def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     shape (p,).
     """
     sizes, directions = np.linalg.eigh(square)
-    collinear = sizes < identification_settings.eigenvalue_of_likeness * sizes[-1]
+    collinear = sizes < EIGENVALUE_OF_LIKENESS * sizes[-1]
     resolved = directions[:, ~collinear]
-    alike = (np.abs(directions[:, collinear]) > np.sqrt(identification_settings.eigenvalue_of_likeness)).any(axis=1)
+    alike = (np.abs(directions[:, collinear]) > np.sqrt(EIGENVALUE_OF_LIKENESS)).any(axis=1)
     return resolved / sizes[~collinear] @ resolved.T, alike
 
 
@@ -197,6 +215,10 @@ def _weight(estimate: Estimate) -> float:
     return (NORMAL_COVERAGE / estimate.half_width) ** 2
 
 
+CHANCE_OF_AGREEMENT = 0.01
+"""Probability (chi-square) below which the scatter of estimates counts as disagreement."""
+
+
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """Return the weighted mean of one key's estimates, and whether they agree (chi-square).
 
@@ -212,7 +234,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
-    if chi2.sf(squares, freedom) > identification_settings.chance_of_agreement:
+    if chi2.sf(squares, freedom) > CHANCE_OF_AGREEMENT:
         errors = np.array([(estimate.half_width - estimate.systematic) / NORMAL_COVERAGE for estimate in estimates])
         error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
         ratio = (squares / freedom) ** 0.5

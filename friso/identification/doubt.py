@@ -20,7 +20,15 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import InverseModel, inverse_model, passes_once, unit_of
+from friso.identification.inverse_model import (
+    ERROR_OF_A_FINE_MODEL,
+    ERROR_OF_A_POOR_MODEL,
+    ERROR_SHARE_OF_A_CLEARLY_BETTER_MODEL,
+    InverseModel,
+    inverse_model,
+    passes_once,
+    unit_of,
+)
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import (
@@ -32,10 +40,8 @@ from friso.identification.output_error.fit import (
     explained_by_forces,
     reaching_over,
 )
-from friso.identification.output_error.parameters import BRISTLES, CURVE, MASS
-from friso.identification.output_error.settings import settings
+from friso.identification.output_error.parameters import BRISTLES, CURVE, HIGHEST_FRICTION_RATIO, MASS
 from friso.identification.readings.common import deflections, stribeck_curve
-from friso.identification.settings import doubt_settings
 from friso.identification.witness import Replay, doubt_of
 from friso.progress import Progress, silent
 from friso.quantities import percent, plain_factor
@@ -178,6 +184,15 @@ class FollowedBristles:
     speed: np.ndarray
 
 
+REACH_OF_AN_EFFECT = 2.0
+"""Factor by which intervals exceed the shift of the fit by an effect. One linear step recovered at most 60 % of an
+error of 1.5 % by a coupling, and half (in the logarithm) of the damping that three samples of delay doubled."""
+
+FORCE_SHARE_OF_A_TOLD_EFFECT = 0.015
+"""Fraction of the force's standard deviation below which a force along the way only widens intervals, unnamed.
+Sound logs showed up to 0.014; a tenth of the friction is at least 0.02."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FitCase(FittedCase):
     """A log of moves with its fit, and the quality of the fit.
@@ -241,7 +256,7 @@ class FitCase(FittedCase):
         `moved` is the shift of the fitted numbers, shape (free,); it is multiplied by a setting, `reach_of_an_effect`.
         `further` widens the intervals of some parameters more, by name.
         """
-        reach = doubt_settings.reach_of_an_effect * np.abs(moved)
+        reach = REACH_OF_AN_EFFECT * np.abs(moved)
         return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
 
     def named(
@@ -267,7 +282,7 @@ class FitCase(FittedCase):
         """
         finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
-        small = size < doubt_settings.force_share_of_a_told_effect * float(np.std(force))
+        small = size < FORCE_SHARE_OF_A_TOLD_EFFECT * float(np.std(force))
         return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
@@ -383,6 +398,13 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
     return tuple(finding.words for finding in raised(moment, case))
 
 
+ERROR_SHARE_OF_A_CAUSE = 0.7
+"""Largest ratio of model errors with and without a cause for the cause to count. Nearer 1, chance finds causes."""
+
+ERROR_RATIO_OF_RIVAL_CAUSES = 1.5
+"""Largest ratio of a cause's error to the best cause's error for both to count."""
+
+
 def causes(case: RecordCase) -> list[RaisedDoubt]:
     """List findings on why a mass with friction does not describe a log.
 
@@ -391,18 +413,27 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
     are examined only if no effect fits much better. Returns [] if nothing explains the log.
     """
     every = list(raised("cause", case))
-    enough = doubt_settings.error_share_of_a_cause * case.inverse.error
+    enough = ERROR_SHARE_OF_A_CAUSE * case.inverse.error
     errors = [(finding.without.error, finding) for finding in every if finding.without]
     better = sorted((pair for pair in errors if pair[0] < enough), key=itemgetter(0))
-    most = doubt_settings.error_ratio_of_rival_causes * (better[0][0] if better else 0.0)
+    most = ERROR_RATIO_OF_RIVAL_CAUSES * (better[0][0] if better else 0.0)
     rivals = [finding for error, finding in better if error <= most]
     plain = [finding for finding in every if finding.without is None]
     return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
 
 
+SPEED_SHARE_OF_CREEPING = 0.01
+"""Speed up to which friction has no direction, relative to the highest."""
+
+
 def way_of(velocity: np.ndarray) -> np.ndarray:
     """Return the direction, -1 to 1, of a velocity [m/s], (n,); it turns gradually near 0."""
-    return np.clip(velocity / (doubt_settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
+    return np.clip(velocity / (SPEED_SHARE_OF_CREEPING * np.abs(velocity).max()), -1.0, 1.0)
+
+
+POWER_LEFT_BY_AN_EFFECT = 0.85
+"""Largest fraction of the residual's power that an effect leaves if it is named. On 45 drawn logs with effects of a
+tenth of the friction and more, the right effect left 0.01 to 0.84; on sound logs no effect explained anything."""
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
@@ -431,7 +462,7 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
         if np.sqrt(np.mean((explained.sizes @ np.stack([*tried.forces])) ** 2)) > largest:
             continue  # no record contains it; a delay may exceed the force at its steps, for some samples
         left = 1 - of_all * (1 - explained.left)
-        if left <= doubt_settings.power_left_by_an_effect:
+        if left <= POWER_LEFT_BY_AN_EFFECT:
             led.append(LeadingEffect(name, tried, replace(explained, left=left)))
     for effect in sorted(led, key=lambda effect: effect.explained.left):
         if effect.explained.sure(case.fit).any():
@@ -456,6 +487,14 @@ def judged_keys(case: KeyCase) -> KeyCase:
     return case
 
 
+BRISTLES_FITTED_TOO_STIFF = 3.0
+"""Largest ratio of imitated stiffness or damping of bristles to the true one. None above 1 was seen."""
+
+BRISTLES_FITTED_TOO_SOFT = 10.0
+"""Largest ratio of the true stiffness or damping of bristles to one that missing effects imitate. With play it was
+8.5."""
+
+
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
     """Return the withheld estimates by key, each with its reason in place of the value.
 
@@ -463,8 +502,8 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
     its lower end divided by the highest ratio of static to Coulomb friction, that of imitated bristles as far as known
     effects have moved them.
     """
-    softer, stiffer = doubt_settings.bristles_fitted_too_stiff, doubt_settings.bristles_fitted_too_soft
-    by_key = {"friction.coulomb": (1 / settings.highest_friction_ratio, 1.0)}
+    softer, stiffer = BRISTLES_FITTED_TOO_STIFF, BRISTLES_FITTED_TOO_SOFT
+    by_key = {"friction.coulomb": (1 / HIGHEST_FRICTION_RATIO, 1.0)}
     by_key |= {key: (1 / softer, stiffer) for key in BRISTLES if reasons.get(key) == IMITATED}
     ranges = {
         one.name: (one.low * by_key[one.name][0], one.high * by_key[one.name][1])
@@ -514,6 +553,15 @@ WITHOUT_FRICTION = ". The stage file says that there is no friction: with a tabl
 """Advice added to a message if the stage file has no friction."""
 
 
+NOISE_RATIO_OF_A_LACKING_MODEL = 5.0
+"""Ratio of residual to noise above which the model lacks something. It was at most 2.6 on 12 drawn sound logs, and
+8 on two logs with play."""
+
+NOISE_RATIO_OF_IMITATED_BRISTLES = 3.0
+"""Ratio of residual to noise above which missing effects may look like bristles. With play, a fit that left 8 times
+the noise gave 31 to 96 kN/m instead of 262 kN/m."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Quality:
     """Quality of a fit of moves, with reasons against trusting it.
@@ -553,17 +601,24 @@ class Quality:
     @property
     def lacks_something(self) -> bool:
         """Tell whether the fit leaves clearly more than noise."""
-        return self.ratio > doubt_settings.noise_ratio_of_a_lacking_model
+        return self.ratio > NOISE_RATIO_OF_A_LACKING_MODEL
 
     @property
     def may_imitate_bristles(self) -> bool:
         """Tell whether the residual is so large that missing effects may look like bristles."""
-        return self.ratio > doubt_settings.noise_ratio_of_imitated_bristles
+        return self.ratio > NOISE_RATIO_OF_IMITATED_BRISTLES
 
     @property
     def lacking(self) -> float:
         """Return the fraction of the RMS residual that is not noise, from 0 to 1."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
+
+
+ERROR_OF_AN_UNSETTLED_RECORD = 0.1
+"""Residual, relative to the force, of both the fit and the best cause above which intervals are widened."""
+
+ERROR_RATIO_OF_A_CONTRADICTION = 1.5
+"""Ratio of the whole model's error to the inverse model's above which it contradicts the log."""
 
 
 def quality_of(
@@ -599,14 +654,14 @@ def quality_of(
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
-    roughly = inverse.error > doubt_settings.error_of_a_poor_model
-    beyond = roughly and left < doubt_settings.error_of_an_unsettled_record * force
+    roughly = inverse.error > ERROR_OF_A_POOR_MODEL
+    beyond = roughly and left < ERROR_OF_AN_UNSETTLED_RECORD * force
     poor = roughly and not beyond
     reasons = causes(case) if plain.lacks_something or poor else []
-    better = doubt_settings.error_share_of_a_clearly_better_model * force
+    better = ERROR_SHARE_OF_A_CLEARLY_BETTER_MODEL * force
     if beyond:
         reasons = [cause for cause in reasons if cause.without is None or better * cause.without.error < left]
-    worse = max(doubt_settings.error_ratio_of_a_contradiction * inverse.error, doubt_settings.error_of_a_fine_model)
+    worse = max(ERROR_RATIO_OF_A_CONTRADICTION * inverse.error, ERROR_OF_A_FINE_MODEL)
     contradicts = plain.whole_error > worse and left > better * inverse.error
     rejected = plain.lacks_something and contradicts and not (beyond or poor)
     seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
@@ -616,12 +671,12 @@ def quality_of(
     findings += raised("value", ValueCase(log, inverse, cart_share, replay, lacks=plain.lacks_something, poor=poor))
     without = tuple(cause.without for cause in reasons if cause.without)
     best = min([inverse.error, *(model.error for model in without)])
-    unsettled = plain.lacks_something and min(left / force, best) > doubt_settings.error_of_an_unsettled_record
+    unsettled = plain.lacks_something and min(left / force, best) > ERROR_OF_AN_UNSETTLED_RECORD
     return replace(
         plain,
         findings=tuple(findings),
         rejected=rejected,
-        failed=poor and plain.whole_error > doubt_settings.error_of_a_poor_model,
+        failed=poor and plain.whole_error > ERROR_OF_A_POOR_MODEL,
         without=without,
         spoilt=unsettled or any(one.spoils for one in (*reasons, *findings)),
         unsettled=unsettled,

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.settings import identification_settings, presentation_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.shown.text import NOTHING, choose, key_in_words, pretty
 
@@ -189,6 +188,10 @@ def digits(value: float, unit: str) -> str:
     return f"{value * factor:.3g} {text}".rstrip()
 
 
+PLAIN_FORCES = (1e-2, 1e4)  # [N]
+"""Range of forces, and of quantities per newton, without an SI prefix; they are compared with each other."""
+
+
 def _scale(estimate: Estimate) -> tuple[float, str]:
     """Return the factor and the prefixed unit in which to write a value.
 
@@ -198,10 +201,17 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
     if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale
         finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
-    low, high = presentation_settings.plain_forces
+    low, high = PLAIN_FORCES
     if unit.startswith("N") and low < size < high:
         return 1.0, pretty(unit)
     return choose(np.array(finite), unit)
+
+
+DIGITS_WITHOUT_AN_INTERVAL = 4
+"""Largest number of significant digits of a value without interval, as many as instruments have."""
+
+DIGITS_OF_AN_UNCERTAINTY = 2
+"""Number of significant digits of an uncertainty, which also sets the digits of the value."""
 
 
 def _places(estimate: Estimate, factor: float) -> int:
@@ -213,18 +223,28 @@ def _places(estimate: Estimate, factor: float) -> int:
             for number in (estimate.value, estimate.low, estimate.high)
             if math.isfinite(number) and number != 0
         ]
-        digits_shown = presentation_settings.digits_without_an_interval
+        digits_shown = DIGITS_WITHOUT_AN_INTERVAL
         return digits_shown - 1 - math.floor(math.log10(max(finite))) if finite else 0
-    return identification_settings.digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
+    return DIGITS_OF_AN_UNCERTAINTY - 1 - math.floor(math.log10(half))
+
+
+ZEROS_BEFORE_AN_EXPONENT = 4
+"""Zeros before the decimal point above which a number gets an exponent, which is then shorter."""
+
+DECIMALS_BEFORE_AN_EXPONENT = 7
+"""Decimals above which a number gets an exponent, which is then shorter."""
+
+DIGITS_OF_AN_EXACT_VALUE = 15
+"""Largest number of digits after the first one; a floating-point number has no more."""
 
 
 def _written(value: float, factor: float, places: int) -> str:
     """Write a value times a factor, to so many decimal places, or with an exponent if shorter."""
-    zeros, decimals = presentation_settings.zeros_before_an_exponent, presentation_settings.decimals_before_an_exponent
+    zeros, decimals = ZEROS_BEFORE_AN_EXPONENT, DECIMALS_BEFORE_AN_EXPONENT
     if math.isfinite(value) and not -zeros <= places <= decimals:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
-        most = min(places + size, presentation_settings.digits_of_an_exact_value)
-        return f"{value * factor:.{max(presentation_settings.digits_without_an_interval - 1, most)}e}"
+        most = min(places + size, DIGITS_OF_AN_EXACT_VALUE)
+        return f"{value * factor:.{max(DIGITS_WITHOUT_AN_INTERVAL - 1, most)}e}"
     rounded = round(value * factor, places)
     return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero
 

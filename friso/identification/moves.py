@@ -45,7 +45,6 @@ from friso.identification.output_error.parameters import MASS, fit_parameters, i
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.to_keys import drawn_from, estimates_of
 from friso.identification.readings.common import noise_of
-from friso.identification.settings import identification_settings
 from friso.identification.witness import Replay, witnessed
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
@@ -383,12 +382,17 @@ def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
     return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
 
 
+BINS_OF_A_RESIDUAL = 40
+"""Number of bins of place, and of speed, in which the mean residual is taken. Fewer hide cogging; more contain
+noise."""
+
+
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
     """Return the fraction of a residual's power that its means over bins of `along` explain.
 
     `along`, shape (n,), is a position or a speed. The fraction that chance explains is subtracted.
     """
-    bins = binned(along, identification_settings.bins_of_a_residual)
+    bins = binned(along, BINS_OF_A_RESIDUAL)
     count = np.bincount(bins)
     means = np.bincount(bins, residual) / np.maximum(count, 1)
     power = float(np.mean(residual**2))

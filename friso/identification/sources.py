@@ -47,7 +47,6 @@ from friso.identification.logs.roles import (
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
 from friso.identification.readings.course import Course
-from friso.identification.settings import identification_settings
 
 MOVED = ("position", "force")
 """Roles of channels from which the kind of experiment is recognised."""
@@ -331,6 +330,10 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     raise LogError("--as", course.words, expected, f"--as {likely}", str(path))
 
 
+BINS_OF_A_SMALL_PLOT = 24
+"""Number of parts of a channel whose means make its small plot."""
+
+
 @dataclass(frozen=True)
 class ChannelContent:
     """A channel of a log file, with the role, such as position, that friso proposes for it.
@@ -387,7 +390,7 @@ class ChannelContent:
 
         The mean of a part without finite values is NaN.
         """
-        parts = np.array_split(self.values, min(identification_settings.bins_of_a_small_plot, max(self.values.size, 1)))
+        parts = np.array_split(self.values, min(BINS_OF_A_SMALL_PLOT, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
         # divided first, because the sum of huge values is infinite
         return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])

@@ -15,11 +15,10 @@ import numpy as np
 from friso.axis import LINEAR
 from friso.equations.controllers.pid import controller_table
 from friso.errors import InputError
-from friso.identification.estimate import Estimate
+from friso.identification.estimate import DIGITS_OF_AN_UNCERTAINTY, Estimate
 from friso.identification.inverse_model import InverseModel, moved_in
 from friso.identification.logs.log import Log
-from friso.identification.output_error.settings import settings
-from friso.identification.settings import identification_settings
+from friso.identification.output_error.parameters import HIGHEST_FRICTION_RATIO
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
@@ -40,6 +39,13 @@ PLACEHOLDER = (
 )
 
 
+BEND_OF_MADE_UP_BRISTLES = 5e-6  # [m]
+"""Deflection of the bristles of a stage made up for a log (friso's choice)."""
+
+MADE_UP_STRIBECK_VELOCITY = 1e-3  # [m/s]
+"""Stribeck velocity of a stage made up for a log (friso's choice)."""
+
+
 def made_up(log: Log, inverse: InverseModel) -> Stage:
     """Make a stage with assumed values for a log without a stage file.
 
@@ -47,7 +53,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     fast as the log's fastest motion.
     """
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
-    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / identification_settings.bend_of_made_up_bristles
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BEND_OF_MADE_UP_BRISTLES
     parts = [moved_in(log, log["position"][part], inverse.bandwidth) for part in log.segments]
     axis = log.axis
     top = max(float(np.abs(part.velocity).max()) for part in parts)
@@ -60,7 +66,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
             "model": "lugre",
             "static": f"{coulomb:.6g} {axis.force}",
             "coulomb": f"{coulomb:.6g} {axis.force}",
-            "stribeck_velocity": f"{identification_settings.made_up_stribeck_velocity:g} {axis.length}/s",
+            "stribeck_velocity": f"{MADE_UP_STRIBECK_VELOCITY:g} {axis.length}/s",
             "stribeck_exponent": 2,
             "bristle_stiffness": f"{stiffness:.6g} {axis.unit('N/m')}",
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
@@ -190,7 +196,7 @@ def round_uncertainty(half: float) -> tuple[str, int]:
 
     The number is negative if tens, hundreds and so on are the last digit.
     """
-    digits = identification_settings.digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
+    digits = DIGITS_OF_AN_UNCERTAINTY - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits
 
@@ -261,9 +267,13 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     flat = stage.flat()
     coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
-    top = settings.highest_friction_ratio * value
+    top = HIGHEST_FRICTION_RATIO * value
     # a bound equal to Coulomb friction adds nothing: static friction then follows Coulomb friction
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
+
+
+SHARE_OF_A_LEAST_VALUE = 1e-3
+"""Lower end of a range that would otherwise reach 0, relative to its upper end."""
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
@@ -282,7 +292,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
         return None, f"{ends} is all that is known, the stage file keeps its value: it has to be {field.bound.text}"
     if _allowed(estimate, field):
         return estimate, ""
-    low = identification_settings.share_of_a_least_value * estimate.high
+    low = SHARE_OF_A_LEAST_VALUE * estimate.high
     cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
     limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):

@@ -17,14 +17,20 @@ from friso.errors import InputError
 from friso.identification.inverse_model import least_squares, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import noise_of
-from friso.identification.settings import doubt_settings
-from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
 from friso.stage.controllers import CONTROLLER, NO_SETTINGS, settings_of
 from friso.stage.tables import TRANSMISSION
 
 if TYPE_CHECKING:
     from friso.frequency.system import System
+
+
+FORCE_LEFT_BY_THE_CONTROLLER = 0.15
+"""Largest share of the logged force that a controller leaves which explains it. Sound records leave 0.02 to 0.09,
+a clock that is off by two 0.6 and more."""
+
+ERROR_OF_AN_AGREEING_SLOPE = 0.15
+"""Largest error of the force by the given controller. Sound records have slopes of 0.94 to 1.00."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +60,7 @@ class Replay:
     def explains(self) -> bool:
         """Tell whether the controller explains the course of the logged force, whatever its size."""
         beyond_noise = np.sqrt(max(self.left**2 - self.noise**2, 0.0))
-        return bool(beyond_noise <= settings.force_left_by_the_controller)
+        return bool(beyond_noise <= FORCE_LEFT_BY_THE_CONTROLLER)
 
     @property
     def steps(self) -> bool:
@@ -62,7 +68,7 @@ class Replay:
         alike = self.slopes is not None and self.slopes[0] * self.slopes[1] > 0
         if not alike or self.slopes is None:
             return False
-        return bool(abs(np.log(self.slopes[1] / self.slopes[0])) <= settings.error_of_an_agreeing_slope)
+        return bool(abs(np.log(self.slopes[1] / self.slopes[0])) <= ERROR_OF_AN_AGREEING_SLOPE)
 
     @property
     def refutes(self) -> bool:
@@ -72,7 +78,44 @@ class Replay:
     @property
     def agrees(self) -> bool:
         """Tell whether the controller explains the logged force, its size included."""
-        return self.explains and abs(self.slope - 1) <= settings.error_of_an_agreeing_slope
+        return self.explains and abs(self.slope - 1) <= ERROR_OF_AN_AGREEING_SLOPE
+
+
+SHARE_OF_A_LIMIT = 0.999
+"""Share of the largest force from which a sample counts as at the limit."""
+
+SHARE_AT_A_LIMIT = 0.005
+"""Share of samples at the largest force above which it counts as a limit."""
+
+DEVIATIONS_AT_A_LIMIT = 6.0
+"""Distance below the largest force at which no limit acts, in standard deviations of the noise."""
+
+SAMPLES_OF_A_START = 10
+"""Samples at the start that do not count, in which filters of the controller forget that they began at rest."""
+
+REACH_OF_A_CLOCK = 20.0
+"""Largest ratio of clocks searched. Larger ones are units, which the logged names tell."""
+
+CLOCKS_TRIED = 41
+"""Clocks tried over that range, a sixth apart. The best one is refined."""
+
+REFINEMENTS_OF_A_CLOCK = 6
+"""Halvings of the step between clocks. Six find a clock to 0.3 %."""
+
+SHARE_LEFT_BY_A_CAUSE = 0.4
+"""Largest share left with another clock or feedforward, relative to that without, for the cause to be believed."""
+
+SHARES_OF_A_RECORD = (0.2, 0.8)
+"""First and last share of a record at which gains may be switched."""
+
+INSTANTS_TRIED = 13
+"""Instants tried over that range."""
+
+LEAST_SHARE_OF_A_STATE = 1e-9
+"""Smallest effect on the force, relative to the largest, by which states of the controller are told apart."""
+
+SAMPLES_OF_DELAY = 4
+"""Longest delay searched from position to force [samples]."""
 
 
 class Witness:
@@ -92,12 +135,12 @@ class Witness:
         self._commands: dict[float, np.ndarray] = {}
         self._ebbs: dict[float, np.ndarray] = {}
         size, limit = np.abs(self.force), float(flat.get(FORCE_LIMIT, np.inf))
-        inside = size < settings.share_of_a_limit * size.max()
-        if np.mean(~inside) < settings.share_at_a_limit:
+        inside = size < SHARE_OF_A_LIMIT * size.max()
+        if np.mean(~inside) < SHARE_AT_A_LIMIT:
             inside[:] = True  # the largest force is no limit
-        noise = doubt_settings.deviations_at_a_limit * noise_of(self.force)
-        inside &= size < settings.share_of_a_limit * limit - noise
-        inside[: settings.samples_of_a_start] = False
+        noise = DEVIATIONS_AT_A_LIMIT * noise_of(self.force)
+        inside &= size < SHARE_OF_A_LIMIT * limit - noise
+        inside[:SAMPLES_OF_A_START] = False
         self.rows = np.flatnonzero(inside)
         self.stretch = np.cumsum(np.diff(inside.astype(int), prepend=0) > 0)[self.rows]
 
@@ -109,14 +152,14 @@ class Witness:
         plain = self._lagged(1.0)
         if plain.explains:
             return plain
-        clocks = np.geomspace(1 / settings.reach_of_a_clock, settings.reach_of_a_clock, settings.clocks_tried)
+        clocks = np.geomspace(1 / REACH_OF_A_CLOCK, REACH_OF_A_CLOCK, CLOCKS_TRIED)
         near = min((self.replay(float(clock)) for clock in clocks), key=lambda one: one.left)
         step = float(clocks[1] / clocks[0])
-        for _ in range(settings.refinements_of_a_clock):
+        for _ in range(REFINEMENTS_OF_A_CLOCK):
             step = step**0.5
             near = min([near, *(self.replay(near.clock * step**side) for side in (-1, 1))], key=lambda one: one.left)
         others = [self._lagged(near.clock), self._lagged(1.0, fed=True)]
-        share = settings.share_left_by_a_cause * plain.left
+        share = SHARE_LEFT_BY_A_CAUSE * plain.left
         sure = [one for one in others if one.agrees and one.left < share]
         return min(sure, key=lambda one: one.left, default=plain)
 
@@ -163,9 +206,9 @@ class Witness:
         Gains that are switched have two slopes.
         """
         signals, count = np.stack([self.command(), self.force], axis=1)[self.rows], len(self.rows)
-        best, slopes = settings.force_left_by_the_controller, None
+        best, slopes = FORCE_LEFT_BY_THE_CONTROLLER, None
         spread = float(np.std(signals[:, 1])) or 1.0
-        for share in np.linspace(*settings.shares_of_a_record, settings.instants_tried):
+        for share in np.linspace(*SHARES_OF_A_RECORD, INSTANTS_TRIED):
             later = np.arange(count) >= int(share * count)
             settled = self._settled(signals, 2 * self.stretch + later, 1.0)
             fits = [least_squares(settled[part, :1], settled[part, 1]) for part in (~later, later)]
@@ -182,7 +225,7 @@ class Witness:
             columns = np.column_stack([np.ones(len(rows)), ebb[: len(rows)]])
             columns = columns[:, columns.any(axis=0)]
             directions, sizes, _ = np.linalg.svd(columns / np.abs(columns).max(axis=0), full_matrices=False)
-            directions = directions[:, sizes > settings.least_share_of_a_state * sizes[0]]
+            directions = directions[:, sizes > LEAST_SHARE_OF_A_STATE * sizes[0]]
             left[rows] = signals[rows] - directions @ (directions.T @ signals[rows])
         return left
 
@@ -204,7 +247,7 @@ class Witness:
 
     def _lagged(self, clock: float, fed: bool = False) -> Replay:
         """Return the best replay with a clock over delays of few samples."""
-        shifts = range(-1, settings.samples_of_delay + 1)
+        shifts = range(-1, SAMPLES_OF_DELAY + 1)
         return min((self.replay(clock, shift, fed) for shift in shifts), key=lambda one: one.left)
 
     def _derivatives(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -224,9 +267,13 @@ def witnessed(log: Log, flat: Mapping[str, Any]) -> tuple[Log, Replay | None]:
         witness, even = _witness(log, flat), replayed(log.as_even, flat)
         if witness and even and even.explains:
             stamped = witness.best()
-            if not stamped.explains or even.left < settings.share_left_by_a_cause * stamped.left:
+            if not stamped.explains or even.left < SHARE_LEFT_BY_A_CAUSE * stamped.left:
                 return log.as_even, replace(even, left_by_stamps=stamped.left)
     return log, replayed(log, flat)
+
+
+SLOPES_OF_A_SCALE = (0.3, 3.0)
+"""Slopes between which gains may be others than stated. Beyond, a unit or a sign is wrong."""
 
 
 def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
@@ -247,16 +294,20 @@ def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
         expected = "the clock with which the drive sampled, or another controller"
         example = f'--dt "{log.sample_time / replay.clock * 1e3:.4g} ms"'
         raise InputError("time", actual, expected, example, log.name)
-    low, high = settings.slopes_of_a_scale
+    low, high = SLOPES_OF_A_SCALE
     if replay.explains and not low < replay.slope < high:
         actual = f"a force that is {replay.slope:.3g} times what the controller of the stage file commands"
         expected = "force and controller with agreeing units and signs (of position, too)"
         thousands = np.log(abs(replay.slope)) / np.log(1000)
         scale = f'--scale force="{1 / replay.slope:.3g} {log.unit("force")}/{log.unit("force")}"'
-        by_unit = replay.slope > 0 and abs(thousands - round(thousands)) < settings.error_of_an_agreeing_slope / 3
+        by_unit = replay.slope > 0 and abs(thousands - round(thousands)) < ERROR_OF_AN_AGREEING_SLOPE / 3
         example = '--unit CHANNEL="mm" for position and reference' if by_unit else scale
         raise InputError("force", actual, expected, example, log.name)
     return replay if replay.explains else replace(replay, slopes=witness.at_both_ends())
+
+
+SAMPLES_OF_A_REPLAY = 50
+"""Fewest samples of a replay that says anything."""
 
 
 def _witness(log: Log, flat: Mapping[str, Any]) -> Witness | None:
@@ -268,7 +319,7 @@ def _witness(log: Log, flat: Mapping[str, Any]) -> Witness | None:
     varies = [
         np.ptp(signal[witness.rows]) if len(witness.rows) else 0.0 for signal in (witness.force, witness.command())
     ]
-    if len(witness.rows) < settings.samples_of_a_replay or not np.all(np.isfinite(varies)) or not all(varies):
+    if len(witness.rows) < SAMPLES_OF_A_REPLAY or not np.all(np.isfinite(varies)) or not all(varies):
         return None
     return witness
 
@@ -279,7 +330,7 @@ def doubt_of(replay: Replay, log: Log) -> str:
     if replay.mass or replay.direction:
         has = "has" if replay.mass > 0 else "lacks"
         also = f", and {abs(replay.direction):.2g} {unit} in its direction"
-        also = also if abs(replay.direction) > settings.error_of_an_agreeing_slope * replay.force else ""
+        also = also if abs(replay.direction) > ERROR_OF_AN_AGREEING_SLOPE * replay.force else ""
         return (
             f"the logged force {has} {abs(replay.mass):.3g} {kg} times the acceleration of the reference{also}, which "
             "the controller of the stage file does not command: a feedforward"

@@ -11,6 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.doubt import (
     IMITATED,
+    POWER_LEFT_BY_AN_EFFECT,
     Doubt,
     FitCase,
     FittedCase,
@@ -19,7 +20,7 @@ from friso.identification.doubt import (
     TriedForces,
     way_of,
 )
-from friso.identification.inverse_model import InverseModel, least_squares, motion
+from friso.identification.inverse_model import SMOOTHING_BANDWIDTHS, InverseModel, least_squares, motion
 from friso.identification.logs.checks import runs
 from friso.identification.output_error.fit import (
     ExplainedResidual,
@@ -31,7 +32,6 @@ from friso.identification.output_error.fit import (
 )
 from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
 from friso.identification.readings.common import digit_of
-from friso.identification.settings import doubt_settings, identification_settings
 from friso.quantities import percent
 
 
@@ -51,20 +51,35 @@ def find_cogging(case: FitCase) -> Iterator[RaisedDoubt]:
     yield case.named_along(effect, words, size)
 
 
+FRICTION_SHARE_OF_A_TRIED_FORCE = 0.05
+"""Size of a tried force, relative to Coulomb friction."""
+
+TRAVELS_OF_A_PITCH = (2.0, 60.0)
+"""Least and largest number of cogging periods along the travel that are tried."""
+
+PITCHES_FOR_EACH_TRAVEL = 4
+"""Number of pitches tried per additional period along the travel. Between two of them the phase slips by a quarter
+turn."""
+
+
 def forces_of_cogging(case: FittedCase) -> Iterator[TriedForces]:
     """Yield forces at several places along the way, then one sine with the best-fitting pitch."""
     problem = case.fit.problem
     position, counted = case.log["position"][case.log.longest], problem.counted > 0
     travel = float(np.ptp(position))
-    unit = doubt_settings.friction_share_of_a_tried_force * float(np.std(case.log["force"][case.log.longest]))
+    unit = FRICTION_SHARE_OF_A_TRIED_FORCE * float(np.std(case.log["force"][case.log.longest]))
     along = places_along(position)
     yield TriedForces(along, [unit] * len(along))
     rest = case.fit.residual[counted]
-    low, high = doubt_settings.travels_of_a_pitch
-    pitches = travel / np.linspace(low, high, 1 + round(doubt_settings.pitches_for_each_travel * (high - low)))
+    low, high = TRAVELS_OF_A_PITCH
+    pitches = travel / np.linspace(low, high, 1 + round(PITCHES_FOR_EACH_TRAVEL * (high - low)))
     explained = [_explained_by(position[counted], pitch, rest) for pitch in pitches]
     pitch = float(pitches[int(np.argmax(explained))])
     yield TriedForces(_waves(position, pitch), [unit] * 2, pitch, len(pitches))
+
+
+PLACES_OF_A_FORCE_ALONG = 12
+"""Number of places along the way with a separate force or friction; each takes a simulated run."""
 
 
 def places_along(position: np.ndarray) -> list[np.ndarray]:
@@ -73,7 +88,7 @@ def places_along(position: np.ndarray) -> list[np.ndarray]:
     `position` [m] has the shape (n,). A function is 1 at its place, and 0 from the neighbouring places on. The first
     place has none.
     """
-    nodes = np.linspace(position.min(), position.max(), doubt_settings.places_of_a_force_along)
+    nodes = np.linspace(position.min(), position.max(), PLACES_OF_A_FORCE_ALONG)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
     return [column - column.mean() for column in near[1:]]
 
@@ -126,7 +141,7 @@ def forces_of_friction_by_place(case: FittedCase) -> Iterator[TriedForces]:
     if "friction.coulomb" not in case.fit.problem.names:
         return
     along = [-column * way_of(case.velocity) for column in places_along(case.log["position"][case.log.longest])]
-    unit = doubt_settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
+    unit = FRICTION_SHARE_OF_A_TRIED_FORCE * case.fit.value("friction.coulomb")
     yield TriedForces(along, [unit] * len(along))
 
 
@@ -163,13 +178,20 @@ def _size(without: InverseModel, model: InverseModel) -> float:
     return float(np.ptp(least_squares(without.columns, along)[1]))
 
 
+PLACES_OF_A_FORCE = 40
+"""Number of places along the way with a separate force. Fewer miss cogging; more take longer."""
+
+ROWS_FOR_EACH_PLACE = 20
+"""Fewest rows of the inverse model for each place with a separate force. With fewer, a place fits noise."""
+
+
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
     """Return a triangular function of position, (n,), for each of several places, by name.
 
     A function is 1 at its place, and 0 from the neighbouring places on. The first place has none. The result is {} for
     a log with few `rows`.
     """
-    count = min(doubt_settings.places_of_a_force, rows // doubt_settings.rows_for_each_place)
+    count = min(PLACES_OF_A_FORCE, rows // ROWS_FOR_EACH_PLACE)
     if count < 3:
         return {}
     nodes = np.linspace(position.min(), position.max(), count)
@@ -220,7 +242,7 @@ def forces_of_friction_by_direction(case: FittedCase) -> Iterator[TriedForces]:
         return
     coulomb, force = case.fit.value("friction.coulomb"), np.abs(case.fit.value(BRISTLES[0]) * bristles.bend)
     for label, against in enumerate((force, force * (1 - coulomb / bristles.level))):
-        yield TriedForces([-against], [doubt_settings.friction_share_of_a_tried_force], label)
+        yield TriedForces([-against], [FRICTION_SHARE_OF_A_TRIED_FORCE], label)
 
 
 FRICTION_BY_DIRECTION = Doubt(
@@ -250,6 +272,10 @@ class RecordDrift:
     sure: bool = field(default=True, kw_only=True)
 
 
+FRICTION_SHARE_OF_A_CHANGE = 0.1
+"""Smallest reported change of friction or constant force, relative to Coulomb friction."""
+
+
 def find_changing_friction(case: FitCase) -> Iterator[RaisedDoubt]:
     """Fit changes of friction and of the constant force to the residual force.
 
@@ -269,7 +295,7 @@ def find_changing_friction(case: FitCase) -> Iterator[RaisedDoubt]:
         ("Friction", changes.friction, "warming up?" if not case.passes_once else "warming up, or a place on the way?"),
         ("The constant force", changes.constant, "a drift of the force?"),
     ):
-        if changes.sure and size > doubt_settings.friction_share_of_a_change * case.inverse.value("coulomb"):
+        if changes.sure and size > FRICTION_SHARE_OF_A_CHANGE * case.inverse.value("coulomb"):
             words = f"{what} changes by {size:.2g} {case.unit} during the record ({cause})"
             yield RaisedDoubt(
                 words=f"{words}: intervals reach from its least to its largest", size=size, unit=case.unit
@@ -298,7 +324,7 @@ def changing_forces(
     `velocity` [m/s] is the record's. Each force, shape (n,), changes along a straight line in either half of the
     record. Also returns the sizes [N] at which the forces are simulated, and the two shapes of change, (n,) each.
     """
-    unit = doubt_settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
+    unit = FRICTION_SHARE_OF_A_TRIED_FORCE * fit.value("friction.coulomb")
     bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
     forces = [base * bend for base in (-way_of(velocity), np.ones(len(velocity))) for bend in bends]
     return forces, [unit] * len(forces), bends
@@ -380,6 +406,15 @@ CHANGING_FRICTION = Doubt(
 )
 
 
+POWER_LEFT_BY_A_LOAD = 0.7
+"""Largest fraction of the residual's power left by load-dependent friction if it is named. It was 0.02 to 0.26 on
+drawn logs with a ratio of 0.1, and at least 0.92 on sound logs."""
+
+SHARES_OF_A_LOAD = (0.02, 0.5)
+"""Smallest and largest plausible ratio of load-dependent friction to the motor's force. It was below 0.009 on sound
+logs; above 0.5 a transmission locks itself."""
+
+
 def find_load_friction(case: FitCase) -> Iterator[RaisedDoubt]:
     """Look for friction in proportion to the motor's force.
 
@@ -392,7 +427,7 @@ def find_load_friction(case: FitCase) -> Iterator[RaisedDoubt]:
     if effect is None or effect.doubt != "load-friction":
         return
     share = float(effect.explained.sizes[0])
-    if effect.explained.left > doubt_settings.power_left_by_a_load or share > doubt_settings.shares_of_a_load[1]:
+    if effect.explained.left > POWER_LEFT_BY_A_LOAD or share > SHARES_OF_A_LOAD[1]:
         return
     words = (
         f"Friction grows with the force of the motor, by {percent(share)} of it, as that of worm gears, belts and "
@@ -402,11 +437,15 @@ def find_load_friction(case: FitCase) -> Iterator[RaisedDoubt]:
     yield RaisedDoubt(words=words, size=share, fit=case.reaching(effect.explained.moved), explains=True)
 
 
+SHARE_OF_A_TRIED_LOAD = 0.02
+"""Size of tried load-dependent friction, relative to the motor's force."""
+
+
 def forces_of_load_friction(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a force against the motion, in proportion to the motor's force."""
     force = case.log["force"][case.log.longest]
-    against, least = -np.abs(force) * way_of(case.velocity), doubt_settings.shares_of_a_load[0]
-    yield TriedForces([against], [doubt_settings.share_of_a_tried_load], least=least)
+    against, least = -np.abs(force) * way_of(case.velocity), SHARES_OF_A_LOAD[0]
+    yield TriedForces([against], [SHARE_OF_A_TRIED_LOAD], least=least)
 
 
 LOAD_FRICTION = Doubt(
@@ -436,9 +475,17 @@ def find_coupling(case: FitCase) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(fit=further)
             return
         share = -float(np.expm1(-lighter))
-        clear = case.leading is not None or explained.left <= doubt_settings.power_left_by_an_effect
+        clear = case.leading is not None or explained.left <= POWER_LEFT_BY_AN_EFFECT
         words = _sentence(share) if clear and case.may_name("coupling") else ""  # averaged motion looks like that, too
         yield RaisedDoubt(words=words, size=share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
+
+
+BANDWIDTHS_OF_A_COUPLING = 2.0
+"""Cut-off of the motion in tests for a coupling, relative to its bandwidth. For 3 kg with a third behind 40 Hz, 2
+and 3 correct a mass 1.3 % too large; 5 corrects half of the error."""
+
+MASS_SHARE_OF_A_TRIED_COUPLING = 0.05
+"""Force of a tried coupling, relative to inertia. Larger forces are not linear."""
 
 
 def forces_of_coupling(case: FittedCase) -> Iterator[TriedForces]:
@@ -446,13 +493,13 @@ def forces_of_coupling(case: FittedCase) -> Iterator[TriedForces]:
     fit, step = case.fit, case.log.sample_time
     if MASS not in fit.fitted:
         return
-    cutoff = doubt_settings.bandwidths_of_a_coupling * case.inverse.bandwidth
+    cutoff = BANDWIDTHS_OF_A_COUPLING * case.inverse.bandwidth
     acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
     force = np.gradient(np.gradient(acceleration, step), step)
     size = float(np.std(force))
     if size > 0:
         force *= fit.value(MASS) * float(np.std(acceleration)) / size
-        yield TriedForces([force], [doubt_settings.mass_share_of_a_tried_coupling])
+        yield TriedForces([force], [MASS_SHARE_OF_A_TRIED_COUPLING])
 
 
 def _sentence(share: float) -> str:
@@ -479,6 +526,20 @@ COUPLING = Doubt(
 )
 
 
+MOST_OF_A_PLAY = 1.5
+"""Largest plausible fitted fraction of mass or friction behind a play. Much more than 1 shows another effect."""
+
+PLAYS_TRIED = (8e-6, 1e-3)  # [m]
+"""Smallest and largest width of play that is tried. Narrower play passes within a few samples; wider play is
+obvious."""
+
+RATIO_OF_PLAYS = 1.4
+"""Ratio of successive tried widths of play. A width wrong by a factor of 1.5 explains half of the effect."""
+
+DIGITS_OF_A_PLAY = 5.0
+"""Smallest width of a play that can be named, in steps of the position."""
+
+
 def find_play(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
@@ -491,7 +552,7 @@ def find_play(case: FitCase) -> Iterator[RaisedDoubt]:
         return
     shares, width = effect.explained.sizes, effect.tried.label
     share = float(shares.max())
-    if share > doubt_settings.most_of_a_play:
+    if share > MOST_OF_A_PLAY:
         return
     what = "mass" if share == shares[0] else "friction"
     words = (
@@ -500,10 +561,29 @@ def find_play(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     named, digit = case.named(effect, words, width, "m"), digit_of(case.log["position"][case.log.longest])
-    low, high = doubt_settings.plays_tried
-    near = doubt_settings.ratio_of_plays**1.5  # the ends of the tried widths, and those next to them
-    inside = max(near * low, doubt_settings.digits_of_a_play * digit) < width < high / near
+    low, high = PLAYS_TRIED
+    near = RATIO_OF_PLAYS**1.5  # the ends of the tried widths, and those next to them
+    inside = max(near * low, DIGITS_OF_A_PLAY * digit) < width < high / near
     yield named if inside else replace(named, words="", explains=False)
+
+
+BANDWIDTHS_OF_A_PLAY = 4.0
+"""Bandwidth of the motion in tests for play, relative to the usual bandwidth. At 1 a gap that is crossed in 5 ms is
+blurred; at 16 noise dominates."""
+
+MASS_SHARE_OF_A_LOOSE_LOAD = 0.5
+"""Assumed mass of a loose load that friction slows down, relative to the total mass."""
+
+SAMPLES_OF_A_CROSSING = 5.0
+"""Fewest samples, on average, in which a load crosses a tried play. With 2, reversals of a sound sine at 500 Hz
+looked like play; with 10, plays of 20 um would be missed at 1 kHz."""
+
+MASS_SHARE_OF_A_TRIED_PLAY = 0.05
+"""Tried loose fraction of the mass. Play acts in proportion to it."""
+
+MASS_SHARE_OF_A_PLAY = 0.1
+"""Smallest loose fraction of the mass for which play is reported. It was 0.03 to 0.08 on 4 of 40 drawn sound logs,
+and at least 0.12 on 8 with play."""
 
 
 def forces_of_play(case: FittedCase) -> Iterator[TriedForces]:
@@ -516,22 +596,22 @@ def forces_of_play(case: FittedCase) -> Iterator[TriedForces]:
     fit, step = case.fit, case.log.sample_time
     if not {MASS, "friction.coulomb"} <= {*fit.problem.names}:
         return
-    cutoff = doubt_settings.bandwidths_of_a_play * identification_settings.smoothing_bandwidths
+    cutoff = BANDWIDTHS_OF_A_PLAY * SMOOTHING_BANDWIDTHS
     moved = motion(case.log["position"][case.log.longest], step, cutoff * case.inverse.bandwidth)
     mass, friction = fit.value(MASS), fit.value("friction.coulomb")
-    low, high = doubt_settings.plays_tried
-    widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(doubt_settings.ratio_of_plays)))
-    slowings = np.repeat([0.0, friction / (doubt_settings.mass_share_of_a_loose_load * mass)], len(widths))
+    low, high = PLAYS_TRIED
+    widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(RATIO_OF_PLAYS)))
+    slowings = np.repeat([0.0, friction / (MASS_SHARE_OF_A_LOOSE_LOAD * mass)], len(widths))
     both = np.tile(widths, 2)
     speeds = loose_loads(moved.position, moved.velocity, step, both, slowings)
     for width, slowing, speed in zip(both, slowings, speeds, strict=True):
         loose = runs(speed != moved.velocity)
-        if sum(one.stop - one.start for one in loose) < doubt_settings.samples_of_a_crossing * len(loose):
+        if sum(one.stop - one.start for one in loose) < SAMPLES_OF_A_CROSSING * len(loose):
             continue
         acceleration = np.diff(speed, prepend=speed[0]) / step
         lacking = [mass * (moved.acceleration - acceleration)]
         lacking += [friction * (np.sign(moved.velocity) - np.sign(speed))] if slowing else []
-        sizes, least = [doubt_settings.mass_share_of_a_tried_play] * len(lacking), doubt_settings.mass_share_of_a_play
+        sizes, least = [MASS_SHARE_OF_A_TRIED_PLAY] * len(lacking), MASS_SHARE_OF_A_PLAY
         yield TriedForces(lacking, sizes, float(width), 2 * len(widths), least)
 
 

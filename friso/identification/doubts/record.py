@@ -12,16 +12,27 @@ from scipy.signal import welch
 
 from friso.errors import InputError
 from friso.identification.combine import spread_of
-from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, RecordCase, TriedForces, ValueCase
+from friso.identification.doubt import (
+    ERROR_SHARE_OF_A_CAUSE,
+    Doubt,
+    FitCase,
+    FittedCase,
+    RaisedDoubt,
+    RecordCase,
+    TriedForces,
+    ValueCase,
+)
 from friso.identification.inverse_model import InverseModel, least_squares
+from friso.identification.logs.assemble import SHARE_OF_CLIPPED_SAMPLES
 from friso.identification.logs.checks import clipped_share, jumps
 from friso.identification.logs.log import Log
-from friso.identification.logs.settings import settings
 from friso.identification.output_error.fit import explained_by_forces, is_sure_beside_all
 from friso.identification.readings.common import digit_of, low_pass
-from friso.identification.settings import doubt_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.quantities import percent
+
+SHARE_OF_A_WHOLE_RECORD = 0.75
+"""Length of the longest stretch without gaps below which gaps are reported, relative to the record."""
 
 
 def _gaps(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -31,12 +42,16 @@ def _gaps(case: RecordCase) -> Iterator[RaisedDoubt]:
     """
     part, step, count = case.log.longest, case.log.sample_time, len(case.log.time)
     share = (part.stop - part.start) / count
-    if share <= doubt_settings.share_of_a_whole_record:
+    if share <= SHARE_OF_A_WHOLE_RECORD:
         words = (
             f"The record has gaps, and the longest stretch without one, {step * (part.stop - part.start):.3g} s of "
             f"{step * count:.3g} s, is all that is fitted: export it without gaps"
         )
         yield RaisedDoubt(words=words, size=share)
+
+
+FRICTION_SHARE_OF_A_DIGIT = 0.1
+"""Resolution of the force above which it is coarse, relative to Coulomb friction."""
 
 
 def _force_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -47,13 +62,17 @@ def _force_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
     """
     force = case.log["force"][case.log.longest]
     digit, coulomb = digit_of(force), abs(case.inverse.value("coulomb"))
-    fine = digit == 0 or digit < doubt_settings.friction_share_of_a_digit * coulomb
+    fine = digit == 0 or digit < FRICTION_SHARE_OF_A_DIGIT * coulomb
     if not (fine or np.median(np.abs(np.diff(force))) > 0):
         words = (
             f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "
             "what friction does at low speed is hidden in them; log it with more digits"
         )
         yield RaisedDoubt(words=words, size=digit, unit=case.unit, spoils=True)
+
+
+DIGITS_OF_A_FINE_POSITION = 500.0
+"""Smallest travel at which the resolution of the position is fine, in steps of the position."""
 
 
 def _position_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -65,7 +84,7 @@ def _position_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
     position = case.log["position"][case.log.longest]
     steps = np.abs(np.diff(position))
     digit, travel = digit_of(position) or float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
-    if digit * doubt_settings.digits_of_a_fine_position >= travel:
+    if digit * DIGITS_OF_A_FINE_POSITION >= travel:
         words = f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
         yield RaisedDoubt(words=words, size=digit, unit="m")
 
@@ -76,7 +95,7 @@ def _clipped_force(case: RecordCase) -> Iterator[RaisedDoubt]:
     A clipped force is too small exactly where inertia is large, which distorts mass and friction.
     """
     share = clipped_share(case.log["force"])
-    if share > settings.share_of_clipped_samples:
+    if share > SHARE_OF_CLIPPED_SAMPLES:
         words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
         yield RaisedDoubt(words=words, size=share, spoils=True)
 
@@ -91,6 +110,13 @@ def _position_jump(case: RecordCase) -> Iterator[RaisedDoubt]:
         at = case.log.time[case.log.longest][sample]
         words = f"the position jumps by {size:.3g} m at {at:.4g} s, as after homing or a reset: cut the record there"
         yield RaisedDoubt(words=words, size=size, unit="m")
+
+
+MOTION_PERIODS_OF_A_SHIFT = 0.25
+"""Longest shift of the force searched, in periods of the motion's bandwidth. Beyond it a sign would turn."""
+
+MOTION_PERIODS_OF_AN_AVERAGE = 1.0
+"""Longest average searched, in periods of the motion's bandwidth. Longer averages leave no motion."""
 
 
 def _timing(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -108,8 +134,8 @@ def _timing(case: RecordCase) -> Iterator[RaisedDoubt]:
         return min(fits, key=lambda choice: fits[choice].error)
 
     period = 1 / (case.inverse.bandwidth * log.sample_time)
-    latest = doubt_settings.motion_periods_of_a_shift * period
-    widest = doubt_settings.motion_periods_of_an_average * period / 2
+    latest = MOTION_PERIODS_OF_A_SHIFT * period
+    widest = MOTION_PERIODS_OF_AN_AVERAGE * period / 2
     lag, _ = best((sign * lag, 1) for lag in _doubling(latest) for sign in (1, -1))
     lag, _ = plain = best((lag + more, 1) for more in (-abs(lag) // 4, abs(lag) // 4) if more)
     _, width = best((lag, sign * (2 * half + 1)) for half in _doubling(widest) for sign in (1, -1))
@@ -117,7 +143,7 @@ def _timing(case: RecordCase) -> Iterator[RaisedDoubt]:
     lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + sign * (wider - 1))) for sign in (-1, 1))
     lag, width = filtered = best((lag + more, width) for more in (-max(abs(lag) // 4, 1), max(abs(lag) // 4, 1)))
     simpler = min(fits[plain].error, _error_of_equal_averages(case, *filtered))
-    choice = filtered if fits[filtered].error < doubt_settings.error_share_of_a_cause * simpler else plain
+    choice = filtered if fits[filtered].error < ERROR_SHARE_OF_A_CAUSE * simpler else plain
     if choice != (0, 1):
         size = choice[0] * log.sample_time
         yield RaisedDoubt(
@@ -210,6 +236,14 @@ ABOUT_RECORDS: dict[str, tuple[Doubt, str]] = {
 """Doubts about the record itself: gaps, digits, range and clock of its channels."""
 
 
+SAMPLES_OF_A_DELAY = 0.25
+"""Smallest reported delay, in samples. Shorter delays may come from holding the force between samples."""
+
+POWER_LEFT_BY_A_DELAY = 0.3
+"""Largest fraction of the residual's power that a delay leaves if it is named. It was 0.01 to 0.09 on 6 drawn logs
+with a delay, and at least 0.4 on 6 sound logs of coarse encoders."""
+
+
 def find_delay(case: FitCase) -> Iterator[RaisedDoubt]:
     """Look for a delay of the force, by the derivative of the logged force.
 
@@ -220,8 +254,8 @@ def find_delay(case: FitCase) -> Iterator[RaisedDoubt]:
     """
     for tried, explained in case.explained(forces_of_delay):
         late, words = -float(explained.sizes[0]), ""
-        long = abs(late) >= doubt_settings.samples_of_a_delay * case.log.sample_time
-        clear = long and explained.left <= doubt_settings.power_left_by_a_delay
+        long = abs(late) >= SAMPLES_OF_A_DELAY * case.log.sample_time
+        clear = long and explained.left <= POWER_LEFT_BY_A_DELAY
         if clear and case.may_name("delay") and is_sure_beside_all(case.fit, tried.forces, tried.units):
             words = (
                 f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a "
@@ -231,6 +265,10 @@ def find_delay(case: FitCase) -> Iterator[RaisedDoubt]:
         yield RaisedDoubt(words=words, size=late, unit="s", fit=case.reaching(explained.moved))
 
 
+SAMPLES_OF_A_TRIED_DELAY = 0.05
+"""Tried delay, in samples. Larger delays act on break-aways in jumps."""
+
+
 def forces_of_delay(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that a small delay adds: in proportion to the logged force's derivative.
 
@@ -238,12 +276,16 @@ def forces_of_delay(case: FittedCase) -> Iterator[TriedForces]:
     """
     force = delay_force(case)
     if not case.fit.problem.closed and force.any():
-        yield TriedForces([force], [doubt_settings.samples_of_a_tried_delay * case.log.sample_time])
+        yield TriedForces([force], [SAMPLES_OF_A_TRIED_DELAY * case.log.sample_time])
+
+
+BANDWIDTHS_OF_A_DELAYED_FORCE = 10.0
+"""Cut-off of the force for its derivative, in bandwidths of the motion. Beyond it the derivative is noise."""
 
 
 def delay_force(case: FittedCase) -> np.ndarray:
     """Return the derivative of the logged force [N/s], shape (n,), without noise."""
-    cutoff = doubt_settings.bandwidths_of_a_delayed_force * case.inverse.bandwidth
+    cutoff = BANDWIDTHS_OF_A_DELAYED_FORCE * case.inverse.bandwidth
     force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
     return np.gradient(force, case.log.sample_time)
 
@@ -272,6 +314,10 @@ def find_drifting_delay(case: FitCase) -> Iterator[RaisedDoubt]:
     yield case.named(effect, words, more, "s")
 
 
+POWER_SHARE_OF_A_DRIFT = 0.5
+"""Largest ratio of residuals with a changing and a constant delay. It was 0.02 to 0.25 on drawn logs."""
+
+
 def forces_of_drifting_delay(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the forces that a constant and a growing delay add.
 
@@ -281,10 +327,10 @@ def forces_of_drifting_delay(case: FittedCase) -> Iterator[TriedForces]:
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():
         return
-    units = [doubt_settings.samples_of_a_tried_delay * case.log.sample_time] * 2
+    units = [SAMPLES_OF_A_TRIED_DELAY * case.log.sample_time] * 2
     both = [force, force * np.linspace(0.0, 1.0, len(force))]
     alone, together = (explained_by_forces(case.fit, both[:count], units[:count]) for count in (1, 2))
-    if together is not None and together.left < doubt_settings.power_share_of_a_drift * (alone.left if alone else 1.0):
+    if together is not None and together.left < POWER_SHARE_OF_A_DRIFT * (alone.left if alone else 1.0):
         yield TriedForces(both, units)
 
 
@@ -323,11 +369,15 @@ DRIFTING_FORCE = Doubt(
 )
 
 
+FORCE_SHARE_OF_A_CONSTANT_FORCE = 0.1
+"""Smallest constant force that is reported beside friction, relative to the force's standard deviation."""
+
+
 def find_constant_force(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Name a constant force that is larger than Coulomb friction and not small against the whole force."""
     inverse = case.inverse
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
-    share = doubt_settings.force_share_of_a_constant_force
+    share = FORCE_SHARE_OF_A_CONSTANT_FORCE
     if offset > max(coulomb, share * float(np.std(inverse.measured))):
         force = f"{inverse.value('offset'):.3g} {case.unit}"
         words = f"a constant force of {force} exceeds the friction: gravity, or an offset of the channel"
@@ -344,6 +394,13 @@ CONSTANT_FORCE = Doubt(
 )
 
 
+SAMPLES_OF_A_SPECTRUM = 256
+"""Number of samples in each piece of the residual for its spectrum. Longer pieces resolve more and scatter more."""
+
+POWER_SHARE_OF_AN_OSCILLATION = 0.5
+"""Fraction of the residual's power in one peak that counts as an oscillation."""
+
+
 def find_oscillation(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Look for a spectral peak that holds most of the residual's power.
 
@@ -352,10 +409,10 @@ def find_oscillation(case: RecordCase) -> Iterator[RaisedDoubt]:
     inverse = case.inverse
     left = inverse.measured - inverse.fitted
     step = float(np.median(np.diff(inverse.time)))
-    rates, power = welch(left, 1 / step, nperseg=min(len(left), doubt_settings.samples_of_a_spectrum))
+    rates, power = welch(left, 1 / step, nperseg=min(len(left), SAMPLES_OF_A_SPECTRUM))
     peak = int(np.argmax(power))
     share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
-    if share < doubt_settings.power_share_of_an_oscillation or peak == 0:
+    if share < POWER_SHARE_OF_AN_OSCILLATION or peak == 0:
         return
     words = (
         f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz: a mode in the band, or a force "
@@ -409,6 +466,13 @@ def find_differing_halves(case: ValueCase) -> Iterator[RaisedDoubt]:
         )
 
 
+RATIO_OF_COMPARABLE_HALVES = 3.0
+"""Largest ratio of the halves' RMS speeds, and of their RMS accelerations, at which they are compared."""
+
+DEVIATIONS_OF_DIFFERING_HALVES = 3.29
+"""Standard deviations by which the halves of a sound record differ once in a thousand times."""
+
+
 def halves(inverse: InverseModel) -> list[Half]:
     """List the mass and frictions of an inverse model that differ between the record's halves.
 
@@ -418,13 +482,13 @@ def halves(inverse: InverseModel) -> list[Half]:
     fits = []
     parts = np.array_split(np.arange(len(inverse.measured)), 2)
     sizes = np.array([np.linalg.norm(inverse.columns[part, :2], axis=0) / np.sqrt(len(part)) for part in parts])
-    unlike = (sizes.max(axis=0) > doubt_settings.ratio_of_comparable_halves * sizes.min(axis=0))[[0, 1, 1]]
+    unlike = (sizes.max(axis=0) > RATIO_OF_COMPARABLE_HALVES * sizes.min(axis=0))[[0, 1, 1]]
     for part in parts:
         columns, force = inverse.columns[part], inverse.measured[part]
         solution, left = least_squares(columns, force)
         fits.append((solution, np.sqrt(np.diag(spread_of(columns, left)))))
     values, off = (np.array(rows) for rows in zip(*fits, strict=True))
-    apart = np.abs(values[0] - values[1]) > doubt_settings.deviations_of_differing_halves * np.hypot(*off)
+    apart = np.abs(values[0] - values[1]) > DEVIATIONS_OF_DIFFERING_HALVES * np.hypot(*off)
     low, high = (values - NORMAL_COVERAGE * off).min(axis=0), (values + NORMAL_COVERAGE * off).max(axis=0)
     return [
         Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))

@@ -10,14 +10,26 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, KeyCase, RaisedDoubt, TriedForces, ValueCase, refused
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.fit import mean_square, refine_fit, simulated_log
-from friso.identification.output_error.parameters import BRISTLES, CURVE, MASS, is_free, stribeck_up_to
+from friso.identification.output_error.fit import (
+    COST_SHARE_OF_REFINEMENT,
+    SEED_OF_REPETITIONS,
+    mean_square,
+    refine_fit,
+    simulated_log,
+)
+from friso.identification.output_error.parameters import (
+    BRISTLES,
+    CURVE,
+    HIGHEST_FRICTION_RATIO,
+    MASS,
+    is_free,
+    stribeck_up_to,
+)
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import by_direction, robust, stribeck_curve
+from friso.identification.readings.course import FEWEST_RAMPS
 from friso.identification.readings.motion_events import Ramps, force_ramps
-from friso.identification.readings.settings import settings as readings_settings
-from friso.identification.settings import doubt_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.quantities import non_negative, positive
 from friso.stage import Stage, numeric_keys, plausible
@@ -50,7 +62,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
     """
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
-    if static is None or len(ramps.forces) < readings_settings.fewest_ramps:
+    if static is None or len(ramps.forces) < FEWEST_RAMPS:
         return None
     if not all(side.any() for side in sides):
         return None
@@ -64,13 +76,18 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
     return middle if middle - unsure > static.high else None
 
 
+SPEEDS_OF_A_START = 50
+"""Number of speeds at which a fitted friction curve is evaluated, up to the speed of a body that just began to
+move."""
+
+
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
     """Return how far friction can exceed static friction [N], up to each of the speeds [m/s].
 
     The result has the shape (n,). Viscous friction may rise faster than the Stribeck curve falls.
     """
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
-    up_to = np.linspace(0, 1, doubt_settings.speeds_of_a_start)[:, None] * speeds
+    up_to = np.linspace(0, 1, SPEEDS_OF_A_START)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)
     curve = stribeck_curve(up_to, coulomb, static, flat["friction.stribeck_velocity"], exponent)
     viscous = flat["friction.viscous"] * (1 + abs(flat.get("friction.viscous_asymmetry", 0.0)))
@@ -102,6 +119,13 @@ def find_decaying_damping(case: FitCase) -> Iterator[RaisedDoubt]:
             )
 
 
+TRIED_FALLING_DAMPING = 0.1
+"""Tried damping at rest of bristles whose damping falls with the speed, relative to half of the critical one."""
+
+LEAST_FALLING_DAMPING = 0.1
+"""Smallest fitted damping at rest that counts as falling, relative to half of the critical one."""
+
+
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that falling damping saves along the log, for half of the critical damping at rest."""
     bristles = case.bristles()
@@ -109,7 +133,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
         return
     damping = np.sqrt(case.fit.value(BRISTLES[0]) * case.fit.value(MASS))
     saved = damping * bristles.rate * (1 - np.exp(-(bristles.speed**2)))
-    yield TriedForces([saved], [doubt_settings.tried_falling_damping], least=doubt_settings.least_falling_damping)
+    yield TriedForces([saved], [TRIED_FALLING_DAMPING], least=LEAST_FALLING_DAMPING)
 
 
 DECAYING_DAMPING = Doubt(
@@ -181,13 +205,17 @@ IMPOSSIBLE_VALUE = Doubt(
 )
 
 
+FORCE_SHARE_OF_NO_FRICTION = 1e-3
+"""Smallest possible Coulomb friction, relative to the force's standard deviation."""
+
+
 def find_little_friction(case: ValueCase) -> Iterator[RaisedDoubt]:
     """Compare the Coulomb friction of the inverse model with zero, and with the whole force.
 
     In a log with one direction of motion, friction and a constant force cannot be separated, and may cancel.
     """
     value, unit = case.inverse.value("coulomb"), case.unit
-    least = doubt_settings.force_share_of_no_friction * float(np.std(case.inverse.measured))
+    least = FORCE_SHARE_OF_NO_FRICTION * float(np.std(case.inverse.measured))
     if value < least:
         yield RaisedDoubt(words=_sentence(case, value, least), size=value, unit=unit)
 
@@ -261,6 +289,10 @@ SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 """Keys of friction beyond the Stribeck effect."""
 
 
+STRIBECK_VELOCITIES_OF_SLIDING = 2.0
+"""Speed, in Stribeck velocities, at which 2 % of the Stribeck effect is left (exponent 2)."""
+
+
 def find_slow_motion(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Refuse friction of a record that is too slow for the Stribeck effect to decay.
 
@@ -271,7 +303,7 @@ def find_slow_motion(case: KeyCase) -> Iterator[RaisedDoubt]:
     if "friction.stribeck_velocity" not in case.flat:
         return
     stribeck = case.determined.get("friction.stribeck_velocity")
-    enough = doubt_settings.stribeck_velocities_of_sliding
+    enough = STRIBECK_VELOCITIES_OF_SLIDING
     top = float(np.abs(case.velocity).max())
     if top >= (enough * stribeck.high if stribeck else stribeck_up_to(case.flat)):
         return
@@ -292,7 +324,7 @@ def _bounded(estimates: Sequence[Estimate], coulomb: Estimate, rise: float, why:
     """
     (bounded,) = refused([coulomb], {coulomb.name: why}).values()
     bounded = replace(bounded, high=bounded.high + max(rise, 0.0))
-    highest = settings.highest_friction_ratio * bounded.high
+    highest = HIGHEST_FRICTION_RATIO * bounded.high
     static = [one for one in estimates if one.name == "friction.static" and not one.determined]
     return {coulomb.name: bounded, **{one.name: one.reaching(bounded.low, highest) for one in static}}
 
@@ -311,6 +343,10 @@ STIFFNESS = "friction.bristle_stiffness"
 WHY_OF_STIFFER_BRISTLES = "errors of the position would leave as much force unexplained on stiffer bristles"
 
 
+STIFFNESSES_TRIED = (4.0, 8.0, 16.0)
+"""Stiffnesses of bristles that are tried beside the fitted one, relative to it."""
+
+
 def find_stiffer_bristles(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Refuse bristles if stiffer ones would explain the record as well as its position allows.
 
@@ -323,13 +359,13 @@ def find_stiffer_bristles(case: KeyCase) -> Iterator[RaisedDoubt]:
         return
     place = fit.problem.names.index(STIFFNESS)
     most = np.log(fit.problem.parameters[place].high) - fit.inner[place]
-    stiffer = np.array([more for more in np.log(doubt_settings.stiffer_bristles) if more <= most])
+    stiffer = np.array([more for more in np.log(STIFFNESSES_TRIED) if more <= most])
     tried = np.repeat(fit.inner[None], 1 + len(stiffer), axis=0)
     tried[1:, place] += stiffer
     free = np.isin(np.arange(len(fit.inner)), [number for number in fit.free if number != place])
-    until = settings.iterations_of_a_profile, settings.cost_share_of_refinement
+    until = settings.iterations_of_a_profile, COST_SHARE_OF_REFINEMENT
     refitted = refine_fit([fit.problem], tried, free, *until, slopes=fit.slopes)
-    rng = np.random.default_rng(settings.seed_of_repetitions)
+    rng = np.random.default_rng(SEED_OF_REPETITIONS)
     beyond = [
         cost / mean_square(_own_log(case, inner, rng).residuals(inner[None]))[0]
         for inner, cost in zip(refitted.inner, refitted.cost, strict=True)

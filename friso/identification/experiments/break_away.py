@@ -16,9 +16,8 @@ from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import AREA, WAYS, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
-from friso.identification.readings.course import Course
+from friso.identification.readings.course import FEWEST_RAMPS, Course
 from friso.identification.readings.motion_events import Ramps, force_ramps, static_friction
-from friso.identification.readings.settings import settings as reading_settings
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
 from friso.shown.text import range_with_unit
@@ -74,7 +73,7 @@ class BreakAwayKind(ExperimentKind[BreakAway]):
         Returns None unless every log has a ramp, and all logs together have enough.
         """
         ramps = [course.ramps for course in courses]
-        enough = all(ramps) and sum(ramps) >= reading_settings.fewest_ramps
+        enough = all(ramps) and sum(ramps) >= FEWEST_RAMPS
         return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
 
     def facts(self, result: BreakAway) -> Facts:
@@ -140,7 +139,7 @@ class BreakAwayKind(ExperimentKind[BreakAway]):
 
     def partial(self, log: Log) -> bool:
         """Tell whether a log alone has too few ramps."""
-        return len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps
+        return len(static_from_ramps(log).ramps.times) < FEWEST_RAMPS
 
 
 KIND = BreakAwayKind()

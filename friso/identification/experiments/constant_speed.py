@@ -19,9 +19,14 @@ from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.common import stribeck_curve
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
-from friso.identification.readings.friction_velocity import Direction, FrictionVelocity, distinct, friction_velocity
+from friso.identification.readings.friction_velocity import (
+    SPEEDS_OF_A_LINE,
+    Direction,
+    FrictionVelocity,
+    distinct,
+    friction_velocity,
+)
 from friso.identification.readings.motion_events import passes
-from friso.identification.readings.settings import settings as reading_settings
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import (
     BLUE,
@@ -169,7 +174,7 @@ class ConstantSpeedKind(ExperimentKind[FrictionAtSpeeds]):
     def partial(self, log: Log) -> bool:
         """Tell whether a log alone has too few speeds for a curve of friction over speed."""
         steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
-        return not steady or distinct(np.array(steady)) < reading_settings.speeds_of_a_line
+        return not steady or distinct(np.array(steady)) < SPEEDS_OF_A_LINE
 
     def claims_together(self, courses: Sequence[Course]) -> str | None:
         """Return why logs move at constant speeds, or None if they do not.
@@ -180,7 +185,7 @@ class ConstantSpeedKind(ExperimentKind[FrictionAtSpeeds]):
         speeds = [course.speeds for course in courses]
         fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))
         count = distinct(np.concatenate(speeds)) if fitting and any(map(len, speeds)) else 0
-        enough = count >= reading_settings.speeds_of_a_line
+        enough = count >= SPEEDS_OF_A_LINE
         return f"most of the way goes at one of {count} constant speeds" if enough else None
 
     def facts(self, result: FrictionAtSpeeds) -> Facts:

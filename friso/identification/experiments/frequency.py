@@ -21,12 +21,11 @@ from friso.identification.kind import (
     Source,
 )
 from friso.identification.logs.log import Log
-from friso.identification.readings.course import Course
+from friso.identification.readings.course import HARMONICS_OF_AN_EXCITATION, RESTS_OF_MOVES, Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.mass_line import StraightLine
 from friso.identification.response.masses import TwoMass
 from friso.identification.response.records import FrequencyResponse
-from friso.identification.settings import experiment_settings
 from friso.identification.stage_file import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
@@ -294,12 +293,9 @@ class FrequencyKind(ExperimentKind[Bench]):
         The motion of such a log hardly rests, contains many frequencies, and turns often.
         """
         repetition = None if course.reference_moves else course.repetition
-        if repetition is None or repetition.rests > experiment_settings.rests_of_moves:
+        if repetition is None or repetition.rests > RESTS_OF_MOVES:
             return None
-        if (
-            repetition.harmonics < experiment_settings.harmonics_of_an_excitation
-            or repetition.turns < repetition.harmonics
-        ):
+        if repetition.harmonics < HARMONICS_OF_AN_EXCITATION or repetition.turns < repetition.harmonics:
             return None
         return f"{course.repeats}, with about {repetition.harmonics:.0f} harmonics"
 

@@ -17,7 +17,6 @@ from friso.hunting import hunting
 from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
-from friso.identification.settings import experiment_settings
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso.shown.text import swing_with_unit, with_unit
@@ -67,6 +66,13 @@ class HuntingLog:
         return -self.below, self.above
 
 
+HYSTERESIS_OF_SWINGS = 0.3  # [of half the swing]
+"""Hysteresis in counting swings. With less, noise counts as hunting; with more, lopsided cycles are missed."""
+
+TRANSIENT_SWING_SHARE = 0.2
+"""Largest difference in size from the later cycles. Cycles that differ more at the beginning are a transient."""
+
+
 def swings_of(log: Log) -> HuntingLog:
     """Return the swings in a log, from the last change of its reference on.
 
@@ -86,7 +92,7 @@ def swings_of(log: Log) -> HuntingLog:
     middle = (low + high) / 2
     if "reference" not in log:
         deviation, middle = deviation - middle, 0.0
-    side = _sides(deviation - middle, experiment_settings.hysteresis_of_swings * (high - low) / 2)
+    side = _sides(deviation - middle, HYSTERESIS_OF_SWINGS * (high - low) / 2)
     ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
     if len(ups) < 3:
         actual = f"{max(len(ups) - 1, 0)} whole cycles after the reference stands"
@@ -94,7 +100,7 @@ def swings_of(log: Log) -> HuntingLog:
     cycles = [slice(first, last) for first, last in pairwise(ups.tolist())]
     above, below = (np.array([way * (way * deviation[one]).max() for one in cycles]) for way in (1, -1))
     sizes = (above - below) / 2
-    settled = np.abs(sizes / np.median(sizes[len(sizes) // 2 :]) - 1) < experiment_settings.transient_swing_share
+    settled = np.abs(sizes / np.median(sizes[len(sizes) // 2 :]) - 1) < TRANSIENT_SWING_SHARE
     first = min(int(settled.argmax()), len(cycles) - 2)
     cycles, above, below, sizes = cycles[first:], above[first:], below[first:], sizes[first:]
     periods = np.diff(time[ups[first:]])

@@ -14,17 +14,22 @@ from friso.identification.combine import Correlated
 from friso.identification.doubt import steady_friction
 from friso.identification.estimate import Estimate, digits, estimates_in_words, name_of, unit_of, with_interval, within
 from friso.identification.estimate_documents import ends_document
-from friso.identification.inverse_model import InverseModel, inverse_model, motion
+from friso.identification.inverse_model import (
+    SAMPLES_OF_AN_EDGE,
+    SMOOTHING_BANDWIDTHS,
+    InverseModel,
+    inverse_model,
+    motion,
+)
 from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.identifiable import Profile
 from friso.identification.output_error.parameters import FitParameter
 from friso.identification.output_error.problem import Simulated, why_continuous
-from friso.identification.output_error.settings import settings
+from friso.identification.output_error.to_keys import MACHINES_DRAWN
 from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.identification.readings.course import Course
-from friso.identification.settings import experiment_settings, identification_settings, presentation_settings
 from friso.identification.stage_file import made_up
 from friso.identification.witness import Replay
 from friso.quantities import percent
@@ -101,6 +106,11 @@ def _play_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
     return [ALIKE.format(f"{max(bends) * 1e6:.2g} um")] if bends else []
 
 
+MOST_ASYMMETRY_OF_FRICTION = 0.3
+"""Largest difference of friction by direction, relative to its mean, that bearings show. A constant force beyond
+that is no asymmetry."""
+
+
 def _direction_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
     """Return a note on friction that differs by direction and would pass for the constant force; none without one."""
     notes = {}
@@ -111,7 +121,7 @@ def _direction_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[s
             bias = values.get(name)
             if bias is not None and coulomb is not None and not bias.low <= 0 <= bias.high:
                 share = abs(bias.value) / coulomb.value
-                if share < identification_settings.most_asymmetry_of_friction:
+                if share < MOST_ASYMMETRY_OF_FRICTION:
                     notes[name] = UNEQUAL.format(name, percent(share), "back" if bias.value > 0 else "forward")
     return [*notes.values()]
 
@@ -143,6 +153,10 @@ def _force(moves: IdentifiedMoves, name: str) -> Figure:
     return Figure(f"{name}_{FORCE}", "Measured and simulated force", caption, (panel,))
 
 
+PERIODS_OF_A_FORCE_RECORD = 40.0
+"""Length of the force record at the head of the page, in periods of the motion's bandwidth."""
+
+
 def _liveliest(moves: IdentifiedMoves) -> slice:
     """Return the samples of the stretch of a log with the most motion, a few periods long."""
     position = moves.log["position"][moves.part]
@@ -151,7 +165,7 @@ def _liveliest(moves: IdentifiedMoves) -> slice:
         len(position),
         max(
             2,
-            round(presentation_settings.periods_of_a_force_record / (moves.inverse.bandwidth * moves.log.sample_time)),
+            round(PERIODS_OF_A_FORCE_RECORD / (moves.inverse.bandwidth * moves.log.sample_time)),
         ),
     )
     first = int(np.argmax(way[length - 1 :] - way[: len(way) - length + 1]))
@@ -207,7 +221,7 @@ def _residual(moves: IdentifiedMoves, name: str) -> Figure:
     moved = motion(
         moves.log["position"][moves.part],
         moves.log.sample_time,
-        identification_settings.smoothing_bandwidths * moves.inverse.bandwidth,
+        SMOOTHING_BANDWIDTHS * moves.inverse.bandwidth,
     )
     left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
     panels = (
@@ -225,15 +239,13 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     """Draw the force without the inertial force over velocity, and the identified friction."""
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
-    step, cutoff = moves.log.sample_time, identification_settings.smoothing_bandwidths * moves.inverse.bandwidth
+    step, cutoff = moves.log.sample_time, SMOOTHING_BANDWIDTHS * moves.inverse.bandwidth
     moved, stage = (
         motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
     )
     force = low_pass(moves.log["force"][moves.part], step, cutoff)
     friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
-    inner = slice(
-        identification_settings.samples_of_an_edge, -identification_settings.samples_of_an_edge
-    )  # the filter has transients at the ends of a record
+    inner = slice(SAMPLES_OF_AN_EDGE, -SAMPLES_OF_AN_EDGE)  # the filter has transients at the ends of a record
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
@@ -258,6 +270,10 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     return Figure(f"{name}_friction", "Friction over velocity", caption, (panel,))
 
 
+MISFIT_AT_THE_TOP = 5.0
+"""Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
+
+
 def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
     """Draw how much worse the fit becomes as one parameter is varied.
 
@@ -271,7 +287,7 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
     panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
     caption = (
         "How much worse the best fit gets with one parameter held and the others refitted; 1 is the end of "
-        f"the 95 % interval (shaded), drawn up to {presentation_settings.misfit_at_the_top:g}. Where a curve stays "
+        f"the 95 % interval (shaded), drawn up to {MISFIT_AT_THE_TOP:g}. Where a curve stays "
         "below 1 to the end of its range, the record does not determine the parameter."
     )
     if any((profile.cost < best - (profile.limit - best)).any() for profile in moves.profiles.values()):
@@ -282,6 +298,10 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
     return [Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)]
 
 
+RATIO_OF_A_LOGARITHMIC_AXIS = 8.0
+"""Ratio of its ends above which a profile has a logarithmic axis."""
+
+
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
     """Draw how much worse the fit becomes as one parameter is varied; 1 is the limit accepted.
 
@@ -289,27 +309,22 @@ def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: boo
     determine the parameter, which sets the colour.
     """
     worse = (profile.cost - best) / (profile.limit - best)
-    log = (
-        parameter.logarithmic
-        and profile.values[-1] > presentation_settings.ratio_of_a_logarithmic_axis * profile.values[0]
-    )
+    log = parameter.logarithmic and profile.values[-1] > RATIO_OF_A_LOGARITHMIC_AXIS * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))
-    y = Axis("Worse by", "", (lowest, presentation_settings.misfit_at_the_top))
+    y = Axis("Worse by", "", (lowest, MISFIT_AT_THE_TOP))
     unit = unit_of(parameter.unit)
     ends = (float(profile.values[0]), float(profile.values[-1]))
     x = Axis(name_of(profile.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
     shade = Band(
         np.array([profile.low, profile.high]),
         np.full(2, lowest),
-        np.full(2, presentation_settings.misfit_at_the_top),
+        np.full(2, MISFIT_AT_THE_TOP),
         "",
         PALE,
     )
     colour = BLUE if fitted else ORANGE
     line = Series(profile.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
-    points = Markers(
-        profile.values, np.where(worse <= presentation_settings.misfit_at_the_top, worse, np.nan), "", colour
-    )
+    points = Markers(profile.values, np.where(worse <= MISFIT_AT_THE_TOP, worse, np.nan), "", colour)
     return Panel("", x, y, (line,), (points,), (Limit((1.0,), "", INK),), bands=(shade,))
 
 
@@ -363,6 +378,10 @@ def _profile_numbers(profile: Profile) -> dict[str, Any]:
     return {**ends, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
+SAMPLES_OF_MOVES = 40_000
+"""Largest number of samples of moves that are used (friso's choice)."""
+
+
 class MovesKind(ExperimentKind[IdentifiedMoves]):
     """Moves, which show mass, friction and constant force, and the joint if it shows."""
 
@@ -381,7 +400,7 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
         """
         if prior.from_user:
             check_roles(log, ("force",))
-        log = log.excerpt(experiment_settings.samples_of_moves)
+        log = log.excerpt(SAMPLES_OF_MOVES)
         flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
         start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
         own_loop = prior.from_user and "reference" in log
@@ -397,7 +416,7 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
 
     def around(self, log: Log) -> Stage | None:
         """Make a stage with assumed values for a log; None if its force is not in newtons."""
-        part = log.excerpt(experiment_settings.samples_of_moves)
+        part = log.excerpt(SAMPLES_OF_MOVES)
         return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
     def notes(self, results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
@@ -405,7 +424,7 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
         loops = [result for result in results if result.loop] if stage is not None else []
         reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
         followed = any(result.loop is None for result in results)
-        long, count = [result.log for result in results if result.log.is_excerpt], experiment_settings.samples_of_moves
+        long, count = [result.log for result in results if result.log.is_excerpt], SAMPLES_OF_MOVES
         return [
             *(sentence for sentence in dict.fromkeys(reasons) if sentence),
             *([WITHOUT_CONTROLLER if stage is None else WITHOUT_REFERENCE] if followed else []),
@@ -547,7 +566,7 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
         return (
             f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
             f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of "
-            f"{settings.machines_drawn} machines drawn from the intervals, and from the ranges of what is not "
+            f"{MACHINES_DRAWN} machines drawn from the intervals, and from the ranges of what is not "
             f"identified, the farthest {farthest}."
         )
 

@@ -19,6 +19,7 @@ from friso.errors import InputError
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate, with_interval
 from friso.identification.estimate_documents import estimates_document
+from friso.identification.experiments.slow_sliding import LOW_PASS_OF_A_CHECK, SHARE_LEFT_UNEXPLAINED
 from friso.identification.kind import (
     TIME,
     AnalysisSettings,
@@ -33,6 +34,7 @@ from friso.identification.output_error.parameters import bends
 from friso.identification.readings import at_bearing as bearing
 from friso.identification.readings.at_bearing import DIRECT, BearingRecord, Between, LowPass
 from friso.identification.readings.common import (
+    BLOCKS_OF_A_MEAN,
     Mean,
     by_t,
     correlation_of,
@@ -41,8 +43,7 @@ from friso.identification.readings.common import (
     solve_normal_equations,
 )
 from friso.identification.readings.course import Course
-from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import experiment_settings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.identification.stage_file import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
@@ -113,6 +114,14 @@ class _Fit:
     bending: float
 
 
+SAMPLES_OF_PRESLIDING = 1000
+"""Fewest samples of a record of pre-sliding. With fewer, the interval is useless."""
+
+BENDING_RANGE = (1e-6, 5.0)
+"""Range of the bristles' bending parameter in a fit, relative to the motion: from a straight line to immediate
+slip."""
+
+
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Estimate bristles from motion that is small against their break-away deflection.
 
@@ -125,20 +134,20 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     spring to ground, nothing is determined. Raises InputError for missing channels.
     """
     record = bearing.record_of(log, log.longest, between)
-    if why := bearing.why_unseen(record, experiment_settings.samples_of_presliding):
+    if why := bearing.why_unseen(record, SAMPLES_OF_PRESLIDING):
         return _nothing(why)
     cutoff, looked_for = bearing.cutoff_of(record), between.delay is None
     tried = [
         (cutoff, looked_for),
-        (experiment_settings.low_pass_of_a_check * cutoff, looked_for),
+        (LOW_PASS_OF_A_CHECK * cutoff, looked_for),
         *([] if looked_for else [(cutoff, True)]),
     ]
     longest = bends(log.axis)[1]
-    if np.ptp(record.body) >= longest * experiment_settings.bending_range[1]:
+    if np.ptp(record.body) >= longest * BENDING_RANGE[1]:
         return _nothing(f"the motion is wider than bristles bend: {SLIDES}")
     best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
-    even = best.doubt + reading_settings.linearity_of_sensors * np.abs(best.values)
+    even = best.doubt + LINEARITY_OF_SENSORS * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
     systematic = np.abs(changes).sum(axis=0) + even
     why = _no_bristles(best, between, record.bent is None, longest)
@@ -152,10 +161,18 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     return Presliding(mass, damping, stiffness, correlation, *curves, best.left, notes)
 
 
+SAMPLES_OF_A_PRESLIDING_PERIOD = 40
+"""Number of samples per period of the low-pass in pre-sliding. More take longer and show no more."""
+
+LOW_PASS_OF_THE_MOTION = 5.0
+"""Ratio of the low-pass frequencies of motion and fit in pre-sliding. Friction depends on faster motion than is
+fitted."""
+
+
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
     """Low-pass and thin a record, as a fit of the force below `cutoff` [Hz] needs it."""
-    every = int(1 / (experiment_settings.samples_of_a_presliding_period * cutoff * record.interval))
-    return record.seen(experiment_settings.low_pass_of_the_motion * cutoff, max(every, 1))
+    every = int(1 / (SAMPLES_OF_A_PRESLIDING_PERIOD * cutoff * record.interval))
+    return record.seen(LOW_PASS_OF_THE_MOTION * cutoff, max(every, 1))
 
 
 def _nothing(why: str) -> Presliding:
@@ -165,15 +182,19 @@ def _nothing(why: str) -> Presliding:
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
 
 
+STIFFNESS_RATIO_OF_A_JOINT = 3.0
+"""Largest ratio of a measured stiffness to the stage file's joint stiffness for it to be the joint's."""
+
+
 def _no_bristles(fit: _Fit, between: Between, held: bool, longest: float) -> str:
     """Return why a fit shows no bristles; "" if it does.
 
     `held` is true if the joint counts as held; a stiffness like the joint's then contradicts that. Bristles bend by
     `longest` [m] at most before they slide.
     """
-    if fit.left > reading_settings.share_left_unexplained:
+    if fit.left > SHARE_LEFT_UNEXPLAINED:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
-    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
+    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < STIFFNESS_RATIO_OF_A_JOINT * between.joint:
         return "the stiffness is like that of the joint: is it held?"
     if fit.ends:
         return f"the bristles yield: {SLIDES}"
@@ -186,7 +207,7 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     `error` is the standard error, to which `systematic` is added. The quantity is not determined if its interval
     reaches 0.
     """
-    mean = Mean(value, error, reading_settings.blocks_of_a_mean - 1)
+    mean = Mean(value, error, BLOCKS_OF_A_MEAN - 1)
     why = (
         "the motion is too slow to show it"
         if key != STIFFNESS
@@ -202,6 +223,22 @@ def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late:
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
+BEND_SHARE_OF_A_SEEN_SPRING = 0.1
+"""Smallest motion that tells a spring from bristles, relative to the longest bend. A smaller one shows a line."""
+
+SHARE_LEFT_BY_SOFT_BRISTLES = 0.99
+"""Fraction of the squared residual below which bristles softer than those of a bearing fit better: a spring."""
+
+SHARE_OF_A_SEEN_SPRING = 0.02
+"""Smallest residual of bristles, relative to the force, that a spring beside them may explain."""
+
+BENDING_BESIDE_A_SPRING = 200.0
+"""Largest bending parameter of bristles that is tried beside a spring, relative to the motion."""
+
+SHARE_LEFT_BY_A_SPRING = 0.25
+"""Fraction of the squared residual below which a spring beside the bristles is taken to act."""
+
+
 def _spring_acts(fit: _Fit, longest: float) -> bool:
     """Tell whether a spring to ground, beside bristles or instead of them, explains the force better than bristles.
 
@@ -210,14 +247,14 @@ def _spring_acts(fit: _Fit, longest: float) -> bool:
     """
     equation = fit.equation
     span, left = float(np.ptp(equation.body)), equation.squares_left(fit.bending)
-    if span > experiment_settings.bend_share_of_a_seen_spring * longest and fit.bending < 1 / longest:
-        return left < experiment_settings.share_left_by_soft_bristles * equation.squares_left(1 / longest)
-    if left <= (experiment_settings.share_of_a_seen_spring * np.linalg.norm(fit.force - fit.force.mean())) ** 2:
+    if span > BEND_SHARE_OF_A_SEEN_SPRING * longest and fit.bending < 1 / longest:
+        return left < SHARE_LEFT_BY_SOFT_BRISTLES * equation.squares_left(1 / longest)
+    if left <= (SHARE_OF_A_SEEN_SPRING * np.linalg.norm(fit.force - fit.force.mean())) ** 2:
         return False
-    tried = np.geomspace(experiment_settings.bending_range[0], experiment_settings.bending_beside_a_spring, 40) / span
+    tried = np.geomspace(BENDING_RANGE[0], BENDING_BESIDE_A_SPRING, 40) / span
     spring = equation.low_pass(equation.body - equation.body.mean())
     least = min(equation.squares_left(bending, spring) for bending in tried)
-    return least < experiment_settings.share_left_by_a_spring * left
+    return least < SHARE_LEFT_BY_A_SPRING * left
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
@@ -228,7 +265,7 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     """
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
-    limits = tuple(np.log(experiment_settings.bending_range))
+    limits = tuple(np.log(BENDING_RANGE))
     squares = lambda logarithm: equation.squares_left(float(np.exp(logarithm)) / span)  # noqa: E731
     best: Any = minimize_scalar(squares, bounds=limits, method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
@@ -238,10 +275,10 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     columns, friction = np.column_stack([x, bent]), target - x[:, 0] * solution[0]
     covariance = jackknife(columns, target)[:3, :3]
     unexplained = target - x @ solution
-    hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
+    hidden = np.linalg.norm(unexplained) + LINEARITY_OF_SENSORS * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = bending * span > 0.99 * experiment_settings.bending_range[1], float(solution[-1]) if late else 0.0
+    ends, more = bending * span > 0.99 * BENDING_RANGE[1], float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
     return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves, equation, bending)
 

@@ -23,9 +23,16 @@ from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Fa
 from friso.identification.logs.log import Log
 from friso.identification.readings import at_bearing as bearing
 from friso.identification.readings.at_bearing import BearingRecord, Between, LowPass
-from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
-from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import experiment_settings, presentation_settings
+from friso.identification.readings.common import (
+    BLOCKS_OF_A_MEAN,
+    Mean,
+    by_t,
+    correlation_of,
+    deflections,
+    jackknife,
+    stribeck_curve,
+)
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
@@ -79,6 +86,10 @@ class SlowSliding:
     warnings: tuple[str, ...] = ()
 
 
+STEP_OF_SLIDING = 1e-3
+"""Relative step for finite differences in slow sliding. Smaller steps drown in rounding errors."""
+
+
 @dataclass(frozen=True)
 class _Equation:
     """The equation of friction for a record of slow sliding, below one low-pass frequency.
@@ -116,8 +127,25 @@ class _Equation:
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residual by the fitted numbers, shape (m, 5)."""
-        here, step = self.model(p), experiment_settings.step_of_sliding
+        here, step = self.model(p), STEP_OF_SLIDING
         return np.stack([(self.model(moved) - here) / step for moved in p + step * np.eye(len(p))], axis=1)
+
+
+SAMPLES_OF_SLOW_SLIDING = 60_000
+"""Largest number of samples of slow sliding that are used. More take longer and show no more."""
+
+FEWEST_SAMPLES_OF_SLIDING = 2000
+"""Fewest samples of slow sliding. With fewer, the interval is useless."""
+
+LOW_PASS_BELOW_A_MODE = 1 / 3
+"""Highest low-pass frequency, relative to the structural mode, which the model lacks."""
+
+STRIBECK_STARTS = (0.2, 0.5)
+"""Stribeck velocities from which fits start, relative to the RMS velocity. One start alone may miss the best
+fit."""
+
+LOW_PASS_OF_A_CHECK = 0.7
+"""Ratio of the low-pass frequencies of the second fit, a check, and the first fit."""
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
@@ -131,19 +159,19 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     taken as exact. Raises InputError for missing channels.
     """
     first, stop = log.longest.start, log.longest.stop
-    part = slice(first, min(stop, first + experiment_settings.samples_of_slow_sliding))
+    part = slice(first, min(stop, first + SAMPLES_OF_SLOW_SLIDING))
     record = bearing.record_of(log, part, between)
-    why = bearing.why_unseen(record, experiment_settings.fewest_samples_of_sliding)
+    why = bearing.why_unseen(record, FEWEST_SAMPLES_OF_SLIDING)
     why = why or (DELAY if between.delay is None else "")
     if why or contact is None:
         return _nothing(why or BRISTLES)
     cutoff = bearing.cutoff_of(record)
-    cutoff = min(cutoff, experiment_settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
+    cutoff = min(cutoff, LOW_PASS_BELOW_A_MODE * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
     equation = _equation(record, between, contact, cutoff, sizes)
-    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in experiment_settings.stribeck_starts])
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STRIBECK_STARTS])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    checked = _equation(record, between, contact, experiment_settings.low_pass_of_a_check * cutoff, sizes)
+    checked = _equation(record, between, contact, LOW_PASS_OF_A_CHECK * cutoff, sizes)
     lower = _fitted(checked, [best])
     shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
@@ -194,6 +222,10 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
     return np.array([level, level, float(low_pass(bearing.rate_of(record.time, record.body)).std()), level, level])
 
 
+LOW_PASS_OF_SLIDING = 8.0
+"""Ratio of the low-pass frequencies of motion and fit in slow sliding. Slips are faster than the fitted force."""
+
+
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
@@ -201,7 +233,7 @@ def _equation(
 
     `contact` has mass and bristles, and `sizes`, shape (5,), the scales of the fitted numbers.
     """
-    seen, low_pass = record.seen(experiment_settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
+    seen, low_pass = record.seen(LOW_PASS_OF_SLIDING * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = bearing.at_bearing(seen, between, contact.mass[0])
     velocity = bearing.rate_of(record.time, body)
     friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
@@ -209,17 +241,24 @@ def _equation(
     return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, contact, sizes)
 
 
+SLIDING_BOUNDS = (0.01, 10.0)
+"""Bounds of the fitted numbers of slow sliding, relative to RMS velocity and mean friction."""
+
+TOLERANCE_OF_SLIDING = 1e-6
+"""Relative change of squares and parameters that ends a fit of slow sliding, far within any interval."""
+
+
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     """Return the numbers of the best fit from several starts, shape (5,).
 
     A start may leave out its last numbers, which then begin at 0.
     """
-    least, most = experiment_settings.sliding_bounds
+    least, most = SLIDING_BOUNDS
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
     complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
     off, slopes = (lambda p: equation.residual(p) / scale), (lambda p: equation.derivatives(p) / scale)
-    tolerance = experiment_settings.tolerance_of_sliding
+    tolerance = TOLERANCE_OF_SLIDING
     options: Any = {"jac": slopes, "bounds": (low, high), "ftol": tolerance, "xtol": tolerance}
     fits: Any = [least_squares(off, start, **options) for start in complete]
     return min(fits, key=lambda fit: fit.cost).x
@@ -237,12 +276,19 @@ def _estimates(
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    even, estimates = (left + reading_settings.linearity_of_sensors) * np.array(values), []
+    even, estimates = (left + LINEARITY_OF_SENSORS) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), reading_settings.blocks_of_a_mean - 1)
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS_OF_A_MEAN - 1)
         systematic = float(np.abs(shifts[:, i]).sum() + even[i])
         estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
     return tuple(estimates), correlation_of(covariance, shifts, even)
+
+
+SHARE_LEFT_UNEXPLAINED = 0.2
+"""Largest residual of a useful model, relative to the standard deviation of friction."""
+
+STRIBECK_VELOCITIES_GONE = 1.5
+"""Speed that slow sliding must reach, in Stribeck velocities. At 1.5 a tenth of the fall of friction is left."""
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
@@ -252,11 +298,11 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
     """
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
-    if left > reading_settings.share_left_unexplained:
+    if left > SHARE_LEFT_UNEXPLAINED:
         return _unknown(f"{percent(left)} of the friction is not explained by LuGre's bristles")
     if not coulomb.low > 0:
         return _unknown("the force shows no friction: does the bearing slide?")
-    if fastest < experiment_settings.stribeck_velocities_gone * stribeck.value:
+    if fastest < STRIBECK_VELOCITIES_GONE * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"
@@ -290,10 +336,14 @@ def slow_sliding_caption(result: SlowSliding) -> str:
     )
 
 
+POINTS_OF_A_RECORD = 5000
+"""Number of points drawn of a record of slow sliding; more make a page heavy and show nothing."""
+
+
 def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     """Draw measured and modelled friction over time and over velocity."""
     friction = Axis("Friction, low-passed", "N")
-    thinned = slice(None, None, max(len(result.time) // presentation_settings.points_of_a_record, 1))
+    thinned = slice(None, None, max(len(result.time) // POINTS_OF_A_RECORD, 1))
 
     def both(x: np.ndarray) -> tuple[Series, ...]:
         """Draw measured and modelled friction over a signal."""
@@ -306,12 +356,16 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     return Panel("", TIME, friction, both(result.time)), over
 
 
+POINTS_OF_A_CURVE = 200
+"""Number of points drawn of the friction curve at steady velocities, which then looks smooth."""
+
+
 def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
     """Draw the friction at steady velocities without the viscous part, in both directions."""
     coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
     if not all(estimate.determined for estimate in result.estimates):
         return ()
-    speeds = np.linspace(0, float(np.abs(result.velocity).max()), presentation_settings.points_of_a_curve)
+    speeds = np.linspace(0, float(np.abs(result.velocity).max()), POINTS_OF_A_CURVE)
     level = stribeck_curve(speeds, coulomb, static, stribeck, result.exponent)
     velocities, forces = (np.concatenate([-values[::-1], [np.nan], values]) for values in (speeds, level))
     return (Series(velocities, forces, "at steady velocity", BLUE, width=2.0),)

@@ -17,7 +17,6 @@ from friso.identification.logs.gaps import GapsError, check_gaps, told_by_mechan
 from friso.identification.logs.log import ROLES, Channel, ChannelTable, Log
 from friso.identification.logs.read import ReadFile, read_file
 from friso.identification.logs.roles import AssignedRole, Mapping, Proposal, option, propose, role_of, wanted_of
-from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import (
     MotionReading,
     Notes,
@@ -29,7 +28,7 @@ from friso.identification.logs.signals import (
     unused,
     with_user_units,
 )
-from friso.identification.logs.time_base import Track, as_stamped, is_uneven, resample_tracks, track
+from friso.identification.logs.time_base import SAMPLES_OF_A_LOG, Track, as_stamped, is_uneven, resample_tracks, track
 from friso.identification.logs.units import unit_factor
 from friso.quantities import percent, quoted
 
@@ -170,6 +169,10 @@ def _stamped(
     return pairs
 
 
+DIFFERENCE_OF_A_CONTRADICTION = 0.05
+"""Relative difference of a specified sample time from that of the time stamps, above which it is mentioned."""
+
+
 def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes) -> list[str]:
     """Write what time stamps say against a specified sample time; nothing if they agree, or are no seconds."""
     specified = reading.mapping.sample_time
@@ -184,7 +187,7 @@ def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Note
     if stamps is None or stamps.size < 2 or not (np.diff(stamps) >= 0).all():
         return []
     usual = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
-    if abs(usual / specified - 1) <= settings.difference_of_a_contradiction:
+    if abs(usual / specified - 1) <= DIFFERENCE_OF_A_CONTRADICTION:
         return []
     return [
         f"time: the time stamps are {usual:.4g} s apart, not {specified:.4g} s as specified: a mass follows from the "
@@ -224,8 +227,8 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
     Position, force and the `needed` roles should change. Raises LogError if not, and for samples implausibly close or
     far apart.
     """
-    if base.time.size < settings.samples_of_a_log:
-        raise LogError("log", f"{base.time.size} samples", f"at least {settings.samples_of_a_log} samples", "")
+    if base.time.size < SAMPLES_OF_A_LOG:
+        raise LogError("log", f"{base.time.size} samples", f"at least {SAMPLES_OF_A_LOG} samples", "")
     if not 1e-9 <= base.period <= 3600:
         expected = "1 ns to 1 h between samples: is the time in another unit?"
         raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
@@ -235,6 +238,10 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
             raise LogError(role, actual, "a signal that changes", f'--map {role}="CHANNEL"')
 
 
+SHORTEST_SAMPLE_TIME = 1e-5  # [s]
+"""Sample time up to which the unit of the time is doubted. Drives sample at 62.5 us and more slowly."""
+
+
 def _no_doubtful_unit(base: Track, reading: Reading) -> None:
     """Check that a clock is not too fast for a machine because its heading has a smaller unit than its values.
 
@@ -242,10 +249,14 @@ def _no_doubtful_unit(base: Track, reading: Reading) -> None:
     """
     mapping, clocks = reading.mapping, [c for c in reading.table.channels if c.unit not in ("", "s")]
     clocks = [c for c in clocks if (role_of(c.name, c.unit) or ("",))[0] == "time" and c.name not in mapping.units]
-    if clocks and mapping.sample_time is None and base.period <= settings.shortest_sample_time:
+    if clocks and mapping.sample_time is None and base.period <= SHORTEST_SAMPLE_TIME:
         actual = f"{base.period * 1e6:.3g} us between samples by a heading in {clocks[0].unit}, faster than drives log"
         example = option("--unit", clocks[0].name, "s")
         raise GapsError([LogError("time", actual, f"the unit of {quoted(clocks[0].name)}", example, reading.origin)])
+
+
+SHARE_OF_CLIPPED_SAMPLES = 1e-3
+"""Fraction of samples in flat tops above which a signal counts as clipped. Noise has no flat tops."""
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
@@ -259,7 +270,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
         if checks.constant(role, values):
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
-        if share > settings.share_of_clipped_samples:
+        if share > SHARE_OF_CLIPPED_SAMPLES:
             on_tops = f"{percent(share, 3)} of the samples lie on flat tops at its extremes"
             lines.append(f"{role}: {on_tops}: saturated or clipped")
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
@@ -287,7 +298,7 @@ def _lost(base: Track) -> list[str]:
 def _missing(base: Track) -> list[str]:
     """Write which parts of a log are missing, and whether its clock is too fast for a machine; [] without either."""
     lines = []
-    if base.period <= settings.shortest_sample_time:
+    if base.period <= SHORTEST_SAMPLE_TIME:
         lines.append(
             f"time: {base.period * 1e6:.3g} us between samples ({1e-6 / base.period:.3g} MHz), faster than drives log: "
             "is the time in a larger unit than its heading says? --unit states another"

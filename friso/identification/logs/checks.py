@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.logs.settings import settings
 
 
 def runs(mask: np.ndarray) -> list[slice]:
@@ -94,6 +93,10 @@ def rises_evenly(values: np.ndarray) -> bool:
     return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
 
 
+SHARE_OF_REPEATED_VALUES = 0.01
+"""Fraction of repeated values up to which a signal hardly ever repeats a value."""
+
+
 def clipped_share(values: np.ndarray) -> float:
     """Return the fraction of samples in flat tops, which show that a signal is clipped.
 
@@ -105,7 +108,7 @@ def clipped_share(values: np.ndarray) -> float:
     if values.size < 5 or steps.max() == 0:
         return 0.0
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
-    repeats = np.count_nonzero(steps[inside] == 0) >= settings.share_of_repeated_values * np.count_nonzero(inside)
+    repeats = np.count_nonzero(steps[inside] == 0) >= SHARE_OF_REPEATED_VALUES * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
         tops = [top for top in runs(values == extreme) if top.stop - top.start >= 3]
         flat = [top for top in tops if not repeats or (top.start >= 2 and steps[top.start - 2] >= 0.2 * steps.max())]
@@ -114,18 +117,29 @@ def clipped_share(values: np.ndarray) -> float:
     return count / values.size
 
 
+NUMBER_OF_LARGE_STEPS = 20
+"""Rank, by size, of the step with which a jump is compared. Larger steps may be jumps themselves."""
+
+RATIO_OF_A_JUMP = 10.0
+"""Ratio of a step to the twentieth largest above which it is a jump, not motion."""
+
+
 def jumps(values: np.ndarray) -> tuple[float, int]:
     """Return the largest step of a signal, and the sample after it, if the step is a jump.
 
     A jump is many times larger than nearly all other steps. Returns (0, 0) without one.
     """
     steps = np.diff(values)
-    if steps.size < settings.number_of_large_steps:
+    if steps.size < NUMBER_OF_LARGE_STEPS:
         return 0.0, 0
     sizes = np.abs(steps)
     largest = int(np.argmax(sizes))
-    usual = np.partition(sizes, -settings.number_of_large_steps)[-settings.number_of_large_steps]
-    return (float(steps[largest]), largest + 1) if sizes[largest] > settings.ratio_of_a_jump * usual else (0.0, 0)
+    usual = np.partition(sizes, -NUMBER_OF_LARGE_STEPS)[-NUMBER_OF_LARGE_STEPS]
+    return (float(steps[largest]), largest + 1) if sizes[largest] > RATIO_OF_A_JUMP * usual else (0.0, 0)
+
+
+SLOWEST_SAMPLING = 20
+"""Largest number of samples for which a slower signal is held. Beyond it the signal consists of steps."""
 
 
 def samples_held(values: np.ndarray) -> int:
@@ -138,7 +152,11 @@ def samples_held(values: np.ndarray) -> int:
         return 1
     gaps = np.diff(changes)
     n = int(np.gcd.reduce(gaps))
-    return n if 1 < n <= settings.slowest_sampling else 1
+    return n if 1 < n <= SLOWEST_SAMPLING else 1
+
+
+SHARE_OF_ALL_BENDS = 0.999
+"""Fraction of a signal's bends that must fall on a grid for it to count as interpolated. The rest is rounding."""
 
 
 def interpolated(values: np.ndarray) -> int:
@@ -147,11 +165,11 @@ def interpolated(values: np.ndarray) -> int:
     A slower signal that was resampled bends only at every n-th sample, n up to 20.
     """
     bends = np.abs(np.diff(values, 2))
-    if bends.size < 50 * settings.slowest_sampling or not bends.any():
+    if bends.size < 50 * SLOWEST_SAMPLING or not bends.any():
         return 1
-    for n in range(settings.slowest_sampling, 1, -1):
+    for n in range(SLOWEST_SAMPLING, 1, -1):
         whole = bends[: bends.size // n * n].reshape(-1, n)
-        alike = whole.sum(axis=0).max() > settings.share_of_all_bends * whole.sum()
+        alike = whole.sum(axis=0).max() > SHARE_OF_ALL_BENDS * whole.sum()
         if alike and np.count_nonzero(whole.max(axis=1)) >= 50:
             return n
     return 1
@@ -238,18 +256,26 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
     return _line("motion", "the force", in_blocks(lambda a, b: _clear_lag(push[a:b], causes[a:b]), push.size), period)
 
 
+LONGEST_DELAY_SAMPLES = 20
+"""Longest delay that is searched, in samples. Longer delays do not come from instruments."""
+
+
 def lag(first: np.ndarray, second: np.ndarray) -> float:
     """Return by how many samples the second signal lags behind the first.
 
     The lag is at the peak of the cross-correlation, interpolated by a parabola; NaN if the peak is below 0.5 or at a
     border of the search.
     """
-    longest = settings.longest_delay_samples
+    longest = LONGEST_DELAY_SAMPLES
     first, second = first - first.mean(), second - second.mean()
     middle = first[longest:-longest]
     products = np.array([middle @ second[k : second.size - 2 * longest + k] for k in range(2 * longest + 1)])
     norm = np.sqrt((middle @ middle) * (second @ second))
     return _peak(products / norm) if norm > 0 else np.nan
+
+
+SHARE_LEFT_BY_A_DELAY = 1 / 3
+"""Largest ratio of the residuals with and without a delay. Sticking looks like a delay too, but leaves half."""
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
@@ -258,8 +284,8 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     The lag is unclear if a lag of 0 explains almost as much.
     """
     shares = _explained(effect, causes)
-    none = 1 - shares[settings.longest_delay_samples]
-    return _peak(shares) if 1 - shares.max() < settings.share_left_by_a_delay * none else np.nan
+    none = 1 - shares[LONGEST_DELAY_SAMPLES]
+    return _peak(shares) if 1 - shares.max() < SHARE_LEFT_BY_A_DELAY * none else np.nan
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
@@ -267,7 +293,7 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
     The effect has the shape (n,); lags run from the longest negative to the longest positive one.
     """
-    longest = settings.longest_delay_samples
+    longest = LONGEST_DELAY_SAMPLES
     middle = effect[longest:-longest] - effect[longest:-longest].mean()
     energy = middle @ middle
     causes = causes / np.maximum(np.abs(causes).max(axis=0), np.finfo(float).tiny)
@@ -289,7 +315,14 @@ def _peak(heights: np.ndarray) -> float:
         return np.nan
     left, top, right = heights[i - 1 : i + 2]
     curve = left - 2 * top + right
-    return i - settings.longest_delay_samples + (0.5 * (left - right) / curve if curve < 0 else 0.0)
+    return i - LONGEST_DELAY_SAMPLES + (0.5 * (left - right) / curve if curve < 0 else 0.0)
+
+
+BLOCKS_OF_A_DELAY = 8
+"""Number of parts of a record whose separate estimates give the interval of a delay."""
+
+SAMPLES_OF_A_BLOCK = 16384
+"""Largest number of samples of a part of a record for its delay. Longer ones take seconds and change nothing."""
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
@@ -300,16 +333,20 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
     """
     from scipy.stats import t as student
 
-    length = size // settings.blocks_of_a_delay
-    if length < 10 * settings.longest_delay_samples:
+    length = size // BLOCKS_OF_A_DELAY
+    if length < 10 * LONGEST_DELAY_SAMPLES:
         return np.nan, np.nan
-    reach = min(length, settings.samples_of_a_block)
-    delays = np.array([estimate(k * length, k * length + reach) for k in range(settings.blocks_of_a_delay)])
+    reach = min(length, SAMPLES_OF_A_BLOCK)
+    delays = np.array([estimate(k * length, k * length + reach) for k in range(BLOCKS_OF_A_DELAY)])
     delays = delays[np.isfinite(delays)]
-    if delays.size < settings.blocks_of_a_delay / 2:
+    if delays.size < BLOCKS_OF_A_DELAY / 2:
         return np.nan, np.nan
     half = student.ppf(0.975, delays.size - 1) * np.std(delays, ddof=1) / np.sqrt(delays.size)
     return float(delays.mean()), float(half)
+
+
+SHORTEST_DELAY_SAMPLES = 0.25
+"""Shortest delay that is reported, in samples. Smoothing of derivatives hides shorter delays."""
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
@@ -320,12 +357,16 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
     samples.
     """
     value, half = estimate
-    if not np.isfinite(value) or abs(value) <= max(half, settings.shortest_delay_samples) or half > 1:
+    if not np.isfinite(value) or abs(value) <= max(half, SHORTEST_DELAY_SAMPLES) or half > 1:
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
     after = f"{late} seems to come after {early} by {size}"
     return f"{after}: a delay between two instruments looks like this; not corrected"
+
+
+SAMPLES_OF_A_DERIVATIVE = 11
+"""Number of samples over which derivatives are smoothed (Savitzky-Golay, without delay)."""
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
@@ -335,7 +376,7 @@ def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
     """
     from scipy.signal import savgol_filter
 
-    window = settings.samples_of_a_derivative
+    window = SAMPLES_OF_A_DERIVATIVE
     if values.size <= 2 * window:
         return values
     return np.asarray(savgol_filter(values, window, 3, deriv=order, delta=period))[window:-window]

@@ -28,9 +28,11 @@ from friso.identification.logs.roles import (
     wanted_of,
     words,
 )
-from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import (
+    CORRELATION_OF_A_PAIR,
     KINDS,
+    SAMPLES_OF_A_PAIR,
+    SHARE_LEFT_BY_A_READING,
     TURNS,
     MotionReading,
     Notes,
@@ -81,6 +83,13 @@ class GapsError(LogError):
         return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
 
 
+PAIRS_OF_A_READING = 1000
+"""Largest number of pairs of a force and a motion that are tried. More take minutes, and one fits by chance."""
+
+RATIO_OF_RIVAL_READINGS = 2.0
+"""Ratio of residuals beyond which a reading is no rival of the best one."""
+
+
 def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> list[MotionReading]:
     """Find force and motion among channels by mechanics, where names leave these roles open.
 
@@ -103,13 +112,13 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     kinds = KINDS[1:] if "velocity" in chosen and chosen["velocity"].by_user and "position" not in chosen else kinds
     motions = [(channel, kind) for kind in kinds for channel in candidates(kind)]
     forces = candidates("force")
-    if len(forces) * len(motions) > settings.pairs_of_a_reading:
+    if len(forces) * len(motions) > PAIRS_OF_A_READING:
         return []
     readings = [one for one in motion_readings(forces, motions) if not _are_alike(one.force, one.motion)]
-    if not readings or readings[0].unexplained > settings.share_left_by_a_reading:
+    if not readings or readings[0].unexplained > SHARE_LEFT_BY_A_READING:
         return []
     readings = with_positions_first(readings)
-    most = max(settings.ratio_of_rival_readings * readings[0].unexplained, readings[0].unexplained + 0.01)
+    most = max(RATIO_OF_RIVAL_READINGS * readings[0].unexplained, readings[0].unexplained + 0.01)
     return [reading for reading in readings if reading.unexplained <= most and reading.doubt == readings[0].doubt]
 
 
@@ -290,12 +299,12 @@ def _are_alike(one: Channel, other: Channel) -> bool:
     if one.values.size != other.values.size:
         return False
     both = np.isfinite(one.values) & np.isfinite(other.values)
-    if np.count_nonzero(both) < settings.samples_of_a_pair:
+    if np.count_nonzero(both) < SAMPLES_OF_A_PAIR:
         return False
     first, second = one.values[both], other.values[both]
     with np.errstate(all="ignore"):
         less, more = sorted((np.ptp(first), np.ptp(second)))
-        return bool(0 < more < 2 * less and np.corrcoef(first, second)[0, 1] > settings.correlation_of_a_pair)
+        return bool(0 < more < 2 * less and np.corrcoef(first, second)[0, 1] > CORRELATION_OF_A_PAIR)
 
 
 def _noise(channel: Channel) -> float:

@@ -14,7 +14,6 @@ import numpy as np
 
 from friso.axis import LINEAR, AxisKind
 from friso.errors import one_line
-from friso.identification.logs.settings import settings
 
 
 @dataclass(frozen=True)
@@ -172,11 +171,15 @@ class Log:
         return self.units.get(role, ROLES[role])
 
 
+SAMPLE_TIME_TOLERANCE = 1e-3
+"""Largest relative difference between the sample times of joined logs."""
+
+
 def joinable(one: Log, other: Log) -> bool:
     """Tell whether two logs have the same roles in the same units, sample time and set-up."""
     same = one.signals.keys() == other.signals.keys() and dict(one.units) == dict(other.units)
     same = same and dict(one.setup) == dict(other.setup) and one.axis == other.axis
-    return same and abs(one.sample_time / other.sample_time - 1) <= settings.sample_time_tolerance
+    return same and abs(one.sample_time / other.sample_time - 1) <= SAMPLE_TIME_TOLERANCE
 
 
 def join_logs(logs: Sequence[Log]) -> Log:

@@ -16,8 +16,8 @@ from friso.errors import LogError
 from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.read import ReadFile
 from friso.identification.logs.roles import AssignedRole, Mapping, propose
-from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, with_user_units
+from friso.identification.logs.time_base import SAMPLES_OF_A_LOG
 from friso.quantities import percent
 
 MOTIONS = ("position", "velocity")
@@ -147,13 +147,23 @@ def motions_of(table: ChannelTable, roles: Roles[str, str]) -> list[_Motion]:
         finite = np.isfinite(channel.values) & np.isfinite(channel.time)
         time, at = np.unique(channel.time[finite], return_index=True)
         values = channel.values[finite][at]
-        if time.size < settings.samples_of_a_log or not np.ptp(values) > 0:
+        if time.size < SAMPLES_OF_A_LOG or not np.ptp(values) > 0:
             continue
         step = float(np.median(np.diff(time)))
         grid = np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
         even = np.interp(time[0] + step * grid, time, (values - values.mean()) / np.ptp(values))
         motions.append(_Motion(channel, roles[channel.name], float(time[0]), step, even))
     return motions
+
+
+WIDTHS_OF_A_MERGE = (2.0, 8.0, 32.0)
+"""Widths of smoothing that are tried, in samples of the slower file: noise asks for wide ones."""
+
+SHARE_OF_A_WIDTH = 0.01
+"""Largest width of smoothing, relative to the shorter record."""
+
+RATIO_OF_RIVAL_MERGES = 2.0
+"""Ratio of what two alignments leave up to which both count: then the motion repeats."""
 
 
 def aligned(first: _Motion, second: _Motion) -> list[Alignment]:
@@ -163,12 +173,19 @@ def aligned(first: _Motion, second: _Motion) -> list[Alignment]:
     if the motions agree nowhere.
     """
     fits: list[list[Alignment]] = []
-    for samples in settings.widths_of_a_merge:
+    for samples in WIDTHS_OF_A_MERGE:
         width = samples * max(first.step, second.step)
-        if width < settings.share_of_a_width * min(first.end - first.start, second.end - second.start):
+        if width < SHARE_OF_A_WIDTH * min(first.end - first.start, second.end - second.start):
             fits += [alike] if (alike := _aligned(first, second, width)) else []
     least = min((alike[0].half_begins for alike in fits), default=0.0)
-    return next((alike for alike in fits if alike[0].half_begins <= settings.ratio_of_rival_merges * least), [])
+    return next((alike for alike in fits if alike[0].half_begins <= RATIO_OF_RIVAL_MERGES * least), [])
+
+
+SHARE_LEFT_BY_A_MERGE = 0.5
+"""Largest share of a motion (RMS) that an alignment may leave. Noise, and another point of the axis, leave less."""
+
+SHARE_LEFT_BY_ROUNDING = 1e-3
+"""Share of a motion up to which what alignments leave is the rounding of the files."""
 
 
 def _aligned(first: _Motion, second: _Motion, width: float) -> list[Alignment]:
@@ -179,12 +196,8 @@ def _aligned(first: _Motion, second: _Motion, width: float) -> list[Alignment]:
         if fit is not None and not any(abs(other.begins - fit.begins) <= coherent for other in fits):
             fits.append(fit)
     fits.sort(key=lambda fit: fit.left)
-    usable = [fit for fit in fits if fit.left <= settings.share_left_by_a_merge]
-    return [
-        fit
-        for fit in usable
-        if fit.left <= settings.ratio_of_rival_merges * max(usable[0].left, settings.share_left_by_rounding)
-    ]
+    usable = [fit for fit in fits if fit.left <= SHARE_LEFT_BY_A_MERGE]
+    return [fit for fit in usable if fit.left <= RATIO_OF_RIVAL_MERGES * max(usable[0].left, SHARE_LEFT_BY_ROUNDING)]
 
 
 def _speed(motion: _Motion, width: float, step: float) -> np.ndarray:
@@ -200,6 +213,19 @@ def _coherence(motion: _Motion, width: float) -> float:
     return float(np.sqrt(speed @ speed / max(change @ change, np.finfo(float).tiny)))
 
 
+SAMPLES_OF_A_CORRELATION = 32768.0
+"""Number of samples of a record by which it is aligned at first. More change nothing."""
+
+DIFFERENCE_OF_CLOCKS = 5e-3
+"""Largest relative difference of two clocks that is searched. Clocks of computers differ by less than 1e-3."""
+
+RATIOS_OF_A_MERGE = 100
+"""Largest number of ratios of clocks that are tried on either side of 1. More take seconds."""
+
+PLACES_OF_A_MERGE = 4
+"""Number of places at which an alignment is begun."""
+
+
 def _candidates(first: _Motion, second: _Motion, width: float, coherent: float) -> list[tuple[float, float]]:
     """Return pairs of a ratio and a beginning [s] at which speeds correlate, the best first.
 
@@ -207,12 +233,12 @@ def _candidates(first: _Motion, second: _Motion, width: float, coherent: float) 
     beginning one of the records overlaps with a share of its motion.
     """
     longest = max(first.end - first.start, second.end - second.start)
-    step = max(first.step, second.step, longest / settings.samples_of_a_correlation)
+    step = max(first.step, second.step, longest / SAMPLES_OF_A_CORRELATION)
     one, other = (_speed(motion, width, step) for motion in (first, second))
-    count = int(np.ceil(settings.difference_of_clocks * (second.end - second.start) / coherent))
-    count = min(count, settings.ratios_of_a_merge)
+    count = int(np.ceil(DIFFERENCE_OF_CLOCKS * (second.end - second.start) / coherent))
+    count = min(count, RATIOS_OF_A_MERGE)
     peaks: list[tuple[float, float, float]] = []
-    for ratio in 1 + settings.difference_of_clocks * np.linspace(-1, 1, 2 * count + 1):
+    for ratio in 1 + DIFFERENCE_OF_CLOCKS * np.linspace(-1, 1, 2 * count + 1):
         stretched = np.interp(np.arange(0, other.size * ratio) / ratio, np.arange(other.size), other, 0.0, 0.0)
         heights = _correlation(one, stretched)
         for at in _peaks(heights, max(1, round(coherent / step))):
@@ -221,9 +247,13 @@ def _candidates(first: _Motion, second: _Motion, width: float, coherent: float) 
     half = 0.5 * (second.end - second.start)
     for height, ratio, begins in sorted(peaks, reverse=True):
         apart = (abs(begins + ratio * half - start - other * half) > coherent for other, start in places)
-        if height > 0 and len(places) < settings.places_of_a_merge and all(apart):
+        if height > 0 and len(places) < PLACES_OF_A_MERGE and all(apart):
             places.append((ratio, begins))
     return places
+
+
+SHARE_OF_AN_OVERLAP = 0.25
+"""Least share of the motion of one of two records that must overlap with the other."""
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -237,7 +267,7 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
     energies = [products(one**2, np.ones_like(other)), products(np.ones_like(one), other**2)]
     shares = [energy / max(energy.max(), np.finfo(float).tiny) for energy in energies]
-    enough = (np.maximum(*shares) >= settings.share_of_an_overlap) & (np.minimum(*shares) > 1e-6)
+    enough = (np.maximum(*shares) >= SHARE_OF_AN_OVERLAP) & (np.minimum(*shares) > 1e-6)
     norm = np.sqrt(np.maximum(energies[0] * energies[1], np.finfo(float).tiny))
     return np.where(enough, np.abs(products(one, other)) / norm, 0.0)
 
@@ -245,11 +275,24 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _peaks(heights: np.ndarray, apart: int) -> list[int]:
     """Return the places of the highest peaks, at least some samples `apart`."""
     heights, places = heights.copy(), []
-    for _ in range(settings.places_of_a_merge):
+    for _ in range(PLACES_OF_A_MERGE):
         at = int(np.argmax(heights))
         places.append(at)
         heights[max(0, at - apart) : at + apart + 1] = 0.0
     return places
+
+
+ROWS_OF_A_MERGE = 50_000
+"""Largest number of samples from which an alignment is fitted. More change little."""
+
+STEPS_OF_A_MERGE = 30
+"""Largest number of steps of Gauss and Newton to an alignment. Most take five."""
+
+PRECISION_OF_A_MERGE = 1e-9
+"""Change of an alignment, relative to the record, below which it is final."""
+
+PARTS_OF_A_MERGE = 24
+"""Number of stretches of a record whose scores give the intervals of an alignment."""
 
 
 def _refined(first: _Motion, second: _Motion, width: float, ratio: float, begins: float) -> Alignment | None:
@@ -261,16 +304,16 @@ def _refined(first: _Motion, second: _Motion, width: float, ratio: float, begins
     """
     orders = [int(motion.kind == "position" and first.kind != second.kind) for motion in (first, second)]
     time, values = first.smoothed(width, orders[0])
-    thin = slice(None, None, max(1, second.values.size // settings.rows_of_a_merge))
+    thin = slice(None, None, max(1, second.values.size // ROWS_OF_A_MERGE))
     second_time, measured = (array[thin] for array in second.smoothed(width, orders[1]))
     own_slope = second.smoothed(width, orders[1] + 1)[1][thin]
     curve = CubicSpline(time, values)
     slope, middle = curve.derivative(), 0.5 * (second_time[0] + second_time[-1])
     begins += ratio * (middle - second.start)  # of the middle, which the ratio does not shift
-    for _ in range(settings.steps_of_a_merge):
+    for _ in range(STEPS_OF_A_MERGE):
         place = begins + ratio * (second_time - middle)
         inside = (place >= time[0]) & (place <= time[-1])
-        if inside.sum() < settings.samples_of_a_log:
+        if inside.sum() < SAMPLES_OF_A_LOG:
             return None
         at, after, aim = place[inside], second_time[inside] - middle, measured[inside]
         linear = np.polyfit(curve(at), aim, 1)
@@ -282,14 +325,14 @@ def _refined(first: _Motion, second: _Motion, width: float, ratio: float, begins
         inverse = np.linalg.pinv(weights.T @ (rows / sizes)) / sizes[:, None]
         change = inverse @ (weights.T @ left)
         begins, ratio = begins + change[0], ratio + change[1]
-        if not abs(ratio - 1) <= 2 * settings.difference_of_clocks:
+        if not abs(ratio - 1) <= 2 * DIFFERENCE_OF_CLOCKS:
             return None
-        if abs(change[0]) + abs(change[1]) * np.ptp(after) < settings.precision_of_a_merge * np.ptp(after):
+        if abs(change[0]) + abs(change[1]) * np.ptp(after) < PRECISION_OF_A_MERGE * np.ptp(after):
             break
     else:
         return None
     share = float(np.std(left) / max(np.std(aim), np.finfo(float).tiny))
-    parts = [np.array_split(array, settings.parts_of_a_merge) for array in (weights, rows / sizes, left)]
+    parts = [np.array_split(array, PARTS_OF_A_MERGE) for array in (weights, rows / sizes, left)]
     whole = weights.T @ (rows / sizes)
     shifts = [np.linalg.pinv(whole - w.T @ r) @ (w.T @ e) / sizes for w, r, e in zip(*parts, strict=True)]
     freedom = len(shifts) - rows.shape[1]

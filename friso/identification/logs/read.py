@@ -93,6 +93,10 @@ def unpacked(path: Path) -> UnpackedFile | None:
     return _unpacked(path.resolve(), start, status.st_size, status.st_mtime_ns)
 
 
+BYTES_OF_A_LOG = 2 << 30  # [B]
+"""Largest file that is read, because all its channels are in memory at once."""
+
+
 @lru_cache(maxsize=2)  # recognising a format and reading the file unpack one file
 def _unpacked(path: Path, start: bytes, size: int, changed: int) -> UnpackedFile | None:
     """Unpack a file that begins with some bytes; `size` and the time of the last change identify its state."""
@@ -102,7 +106,7 @@ def _unpacked(path: Path, start: bytes, size: int, changed: int) -> UnpackedFile
     if start.startswith(ZIP) and len(names) != 1:
         actual = f"a ZIP archive of {len(names)} files"
         raise LogError("log", actual, "an archive of one file, or the log unpacked from it", "", str(path))
-    most = min(settings.bytes_of_a_log, settings.bytes_unpacked + settings.bytes_unpacked_per_byte * size)
+    most = min(BYTES_OF_A_LOG, settings.bytes_unpacked + settings.bytes_unpacked_per_byte * size)
     kept = UnpackedFile(PurePosixPath(names[0].replace("\\", "/")).name if names else path.stem)
     try:
         if names:
@@ -156,6 +160,13 @@ def content(kind: str, path: Path) -> dict[str, Any]:
     return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
 
 
+MEMORY_PER_BYTE = 12
+"""Memory limit per byte of the file, because compressed files grow."""
+
+SPEED_OF_READING = 5e6  # [B/s]
+"""Reading speed from which the time limit follows. Sound files are read much faster."""
+
+
 @lru_cache(maxsize=1)  # recognising a format and reading the file ask for one content
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     """Read a binary log in a separate process; the result is cached until the file changes.
@@ -163,8 +174,8 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     `size` [B] and the time of the last change, `changed`, identify its state. Raises LogError for a file that cannot be
     read.
     """
-    memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
-    seconds = settings.time_of_reading + size / settings.speed_of_reading
+    memory = settings.memory_of_reading + MEMORY_PER_BYTE * size if LIMITS_MEMORY else 0
+    seconds = settings.time_of_reading + size / SPEED_OF_READING
     patience = settings.patience_with_a_busy_machine * seconds
     command = [sys.executable, "-P", binary.__file__, kind, str(path), *map(str, (memory, seconds, 2 * patience))]
     try:
@@ -267,13 +278,18 @@ class TextSample:
     later: int
 
 
+BYTES_OF_A_PART = 1 << 19  # [B]
+"""Size of the beginning, the middle and the end of a text of which a sample is read. Smaller texts are read as a
+whole: that takes a second."""
+
+
 def sample_of(path: Path) -> TextSample | None:
     """Take whole lines from the beginning, the middle and the end of a text.
 
     Returns None for a text that is hardly larger than its sample, or whose lines end with another sign than a line
     feed. Raises LogError for what is no text.
     """
-    size, part = path.stat().st_size, settings.bytes_of_a_part
+    size, part = path.stat().st_size, BYTES_OF_A_PART
     encoding = decoded_head(path)[0]
     if size < 2 * 3 * part or encoding.startswith("utf-16"):
         return None
@@ -386,8 +402,8 @@ def _plain_format(path: Path) -> str:
         raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None
     if size == 0:
         raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))
-    if size > settings.bytes_of_a_log:
-        expected = f"at most {settings.bytes_of_a_log / 2**30:.3g} GiB: cut the log, or save only the channels needed"
+    if size > BYTES_OF_A_LOG:
+        expected = f"at most {BYTES_OF_A_LOG / 2**30:.3g} GiB: cut the log, or save only the channels needed"
         raise LogError("log", f"a file of {size / 2**30:.3g} GiB", expected, "", str(path))
     for name in sorted(FORMATS, key=lambda name: FORMATS[name].rank):
         if FORMATS[name].recognise(head):
@@ -405,6 +421,10 @@ def read_table(path: Path | str) -> ChannelTable:
     Raises LogError for a file of unknown format, or one that its format cannot read.
     """
     return read_file(path).table
+
+
+SAMPLES_OF_A_LOOK = 100_000
+"""Number of first samples from which `friso logs` recognises the kind of experiment."""
 
 
 @dataclass(frozen=True)
@@ -425,7 +445,7 @@ class ReadFile:
     @property
     def looked_at(self) -> int:
         """Return the number of samples from which the kind of experiment is recognised without waiting."""
-        return settings.samples_of_a_look if self.begins is None else min(self.begins, settings.samples_of_a_look)
+        return SAMPLES_OF_A_LOOK if self.begins is None else min(self.begins, SAMPLES_OF_A_LOOK)
 
     @property
     def sampled(self) -> str:

@@ -24,7 +24,6 @@ import numpy as np
 from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES, Channel, ChannelTable
-from friso.identification.logs.settings import settings
 from friso.identification.logs.units import channel_words, split_heading, unit_factor, without_accents
 from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
@@ -452,6 +451,10 @@ def option(name: str, left: str, right: str) -> str:
     return f"{name} {shell_word(f'{left}={right}')}"
 
 
+BYTES_OF_A_LOG_NAME = 150  # [B]
+"""Longest part of a log's name that is used in its mapping file's name. File systems allow 255 bytes."""
+
+
 def sidecar(log: Path, folder: Path | None = None) -> Path:
     """Return the path of a log's mapping file, beside the log or in a folder.
 
@@ -461,7 +464,7 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
     if folder is None:
         return log.parent / f"{log.name}{SUFFIX}"
     own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]
-    name = log.name.encode(errors="ignore")[: settings.bytes_of_a_log_name].decode(errors="ignore")
+    name = log.name.encode(errors="ignore")[:BYTES_OF_A_LOG_NAME].decode(errors="ignore")
     return folder / f"{name}.{own}{SUFFIX}"
 
 

@@ -25,7 +25,6 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.checks import rises_evenly, unwrapped
 from friso.identification.logs.log import ROLES, Channel, ChannelTable
 from friso.identification.logs.roles import AssignedRole, Mapping, find, guess, is_clock, option, words
-from friso.identification.logs.settings import settings
 from friso.identification.logs.text import RATES, STEPS, with_times
 from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
@@ -56,6 +55,10 @@ class MotionReading:
         return self.force if role == "force" else self.motion if role == self.kind else None
 
 
+SHARE_LEFT_BY_A_READING = 0.5
+"""Largest fraction of a force that a useful reading by mechanics leaves."""
+
+
 def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, str]]) -> list[MotionReading]:
     """Fit every force with every motion (a channel and its kind); the best reading comes first.
 
@@ -68,7 +71,7 @@ def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, 
         values, moved = signals[id(force)], signals[id(motion)]
         if force is not motion and values is not None and moved is not None and len(values) == len(moved):
             readings.append(_reading(force, motion, kind, values, moved))
-    refuted = settings.share_left_by_a_reading
+    refuted = SHARE_LEFT_BY_A_READING
     return sorted(readings, key=lambda one: (one.unexplained > refuted, one.doubt, one.unexplained))
 
 
@@ -77,10 +80,14 @@ def with_positions_first(readings: Sequence[MotionReading]) -> list[MotionReadin
 
     A position contains all that its derivative contains, and also the micrometres of bending bristles.
     """
-    best, refuted = readings[0], settings.share_left_by_a_reading
+    best, refuted = readings[0], SHARE_LEFT_BY_A_READING
     as_good = [one for one in readings if one.doubt == best.doubt and one.unexplained <= refuted]
     first = [one for one in as_good if one.force is best.force and _is_integral(one, best)]
     return [*first, *(one for one in readings if one not in first)]
+
+
+CORRELATION_OF_A_PAIR = 0.99
+"""Correlation above which two channels may be the commanded and the measured one."""
 
 
 def _is_integral(one: MotionReading, best: MotionReading) -> bool:
@@ -95,22 +102,33 @@ def _is_integral(one: MotionReading, best: MotionReading) -> bool:
     columns /= np.abs(columns).max(axis=0)
     solution, *_ = np.linalg.lstsq(columns, place, rcond=None)
     correlation = np.corrcoef(place - columns[:, 1:] @ solution[1:], columns[:, 0])[0, 1]
-    return bool(correlation > settings.correlation_of_a_pair)
+    return bool(correlation > CORRELATION_OF_A_PAIR)
+
+
+SAMPLES_OF_A_PAIR = 20
+"""Fewest samples from which the correlation of two channels is judged."""
+
+RANGE_SHARE_OFF_A_CLOCK = 0.01
+"""Largest deviation of a clock from a straight line, over its range."""
 
 
 def is_ramp(channel: Channel) -> bool:
     """Tell whether a channel rises with every sample, as a counter or a clock with jitter does."""
     finite = channel.values[np.isfinite(channel.values)]
-    if len(finite) < settings.samples_of_a_pair or not (np.diff(finite) > 0).all():
+    if len(finite) < SAMPLES_OF_A_PAIR or not (np.diff(finite) > 0).all():
         return False
     line = np.linspace(finite[0], finite[-1], len(finite))
     off = float(np.abs(finite - line).max())
-    return rises_evenly(finite) or off < settings.range_share_off_a_clock * float(np.ptp(finite))
+    return rises_evenly(finite) or off < RANGE_SHARE_OFF_A_CLOCK * float(np.ptp(finite))
 
 
 def is_counter(channel: Channel) -> bool:
     """Tell whether a channel counts samples: it rises by 1 from whole number to whole number."""
     return len(channel.values) > 1 and bool((np.diff(channel.values) == 1).all()) and channel.values[0] % 1 == 0
+
+
+SAMPLES_OF_A_SCALE = 2.0
+"""Width of smoothing before differentiation on each time scale, in samples. With less, noise dominates."""
 
 
 def leads(one: Channel, other: Channel) -> bool:
@@ -122,11 +140,15 @@ def leads(one: Channel, other: Channel) -> bool:
     size = len(one.values)
     if size != len(other.values) or any(signal is None for signal in signals):
         return False
-    width = settings.samples_of_a_scale
+    width = SAMPLES_OF_A_SCALE
     first, second = (gaussian_filter1d(signal, width, order=1) for signal in signals if signal is not None)
     products = correlate(second - second.mean(), first - first.mean(), method="fft")
     shift = int(np.argmax(products[size - 1 - size // 10 : size + size // 10])) - size // 10
     return shift >= 1
+
+
+SAMPLES_OF_A_READING = 64
+"""Fewest samples from which channels are recognised by mechanics (force, acceleration). Fewer fit by chance."""
 
 
 def _filled(channel: Channel) -> np.ndarray | None:
@@ -135,7 +157,7 @@ def _filled(channel: Channel) -> np.ndarray | None:
     Returns None for a channel with few values, or a constant one.
     """
     finite = np.isfinite(channel.values)
-    if finite.sum() < settings.samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
+    if finite.sum() < SAMPLES_OF_A_READING or not np.ptp(channel.values[finite]) > 0:
         return None
     places = np.arange(len(channel.values))
     with np.errstate(all="ignore"):
@@ -151,7 +173,7 @@ def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, mov
     is a position or a velocity.
     """
     rows = []
-    while len(values) >= settings.samples_of_a_reading:
+    while len(values) >= SAMPLES_OF_A_READING:
         rows += [row for row in [_fitted(values, moved, kind)] if row is not None]
         even = len(values) // 2 * 2
         values, moved = (array[:even].reshape(-1, 2).mean(axis=1) for array in (values, moved))
@@ -160,9 +182,16 @@ def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, mov
     left, inertia, friction, alike = np.array(rows).T
     mean = float(np.where(inertia * friction >= 0, left, 1.0).mean())
     against = float(np.sum((1 - left) * (inertia + friction))) < 0
-    same, size = settings.correlation_of_a_pair, np.abs(inertia) + np.abs(friction)
+    same, size = CORRELATION_OF_A_PAIR, np.abs(inertia) + np.abs(friction)
     alone = 1 if (np.abs(inertia) > same * size).all() else 2 if alike.max() > same else 0
     return MotionReading(force, motion, kind, mean, -1 if against else 1, alone + 4 * against)
+
+
+ROWS_OF_A_SCALE = 4000
+"""Largest number of rows fitted on each time scale. More change nothing."""
+
+SPEED_SHARE_OF_A_REST = 0.03
+"""Fraction of the highest speed below which a body may rest, with unknown friction."""
 
 
 def _fitted(values: np.ndarray, moved: np.ndarray, kind: str) -> tuple[float, float, float, float] | None:
@@ -171,14 +200,14 @@ def _fitted(values: np.ndarray, moved: np.ndarray, kind: str) -> tuple[float, fl
     Returns the remaining fraction of the variance, the sizes of inertia and friction with their signs, and the
     correlation of the force with the velocity.
     """
-    width, order = settings.samples_of_a_scale, 1 - KINDS.index(kind)
-    edge, step = int(4 * width), max(1, len(values) // settings.rows_of_a_scale)
+    width, order = SAMPLES_OF_A_SCALE, 1 - KINDS.index(kind)
+    edge, step = int(4 * width), max(1, len(values) // ROWS_OF_A_SCALE)
     inner = slice(edge, -edge, step)
     push = gaussian_filter1d(values, width)[inner]
     velocity, acceleration = (gaussian_filter1d(moved, width, order=order + more)[inner] for more in (0, 1))
-    moves = np.abs(velocity) > settings.speed_share_of_a_rest * np.percentile(np.abs(velocity), 99)
+    moves = np.abs(velocity) > SPEED_SHARE_OF_A_REST * np.percentile(np.abs(velocity), 99)
     push, velocity, acceleration = push[moves], velocity[moves], acceleration[moves]
-    if len(push) < settings.samples_of_a_pair or not np.var(push) > 0:
+    if len(push) < SAMPLES_OF_A_PAIR or not np.var(push) > 0:
         return None
     columns = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)
     columns /= np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
@@ -256,6 +285,10 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
     return replace(table, channels=timed_channels)
 
 
+LARGEST_VALUE = 1e30
+"""Largest number of an instrument. Beyond it, squares of squares overflow."""
+
+
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     """Return the values of a channel in the unit of its role, and add notes on the conversion.
 
@@ -290,7 +323,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     with np.errstate(all="ignore"):  # NaN is left to the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    if most > settings.largest_value:
+    if most > LARGEST_VALUE:
         actual = f"values up to {most:.3g} {notes.units.get(role, reading.unit(role))}"
         raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values
@@ -380,10 +413,14 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
 
 
+LARGEST_TRAVEL_IN_WHOLE_UNITS = 1000.0
+"""Largest travel of whole numbers without a unit that is no counter. A travel of more is at least in um."""
+
+
 def _counted(values: np.ndarray) -> bool:
     """Tell whether a channel holds whole numbers that change by more than one unit would on a machine."""
     finite = values[np.isfinite(values)]
-    wide = finite.size > 0 and np.ptp(finite) > settings.largest_travel_in_whole_units
+    wide = finite.size > 0 and np.ptp(finite) > LARGEST_TRAVEL_IN_WHOLE_UNITS
     return bool(wide and (finite == np.round(finite)).all())
 
 

@@ -24,7 +24,6 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
-from friso.identification.logs.settings import settings
 from friso.identification.logs.units import is_unit, split_heading
 from friso.quantities import quoted
 
@@ -208,13 +207,17 @@ class TextLayout:
         )
 
 
+BYTES_OF_A_HEAD = 1 << 18  # [B]
+"""Size of the beginning of a text file that is examined to find its layout."""
+
+
 def decoded_head(path: Path) -> tuple[str, list[str]]:
     """Return encoding and first lines of a text file.
 
     Raises LogError for what is no text.
     """
     with path.open("rb") as file:
-        decoded = _decoded(file.read(settings.bytes_of_a_head))
+        decoded = _decoded(file.read(BYTES_OF_A_HEAD))
     if decoded is None:
         raise LogError(
             "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
@@ -244,7 +247,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     if odd > 0.02 * len(text):
         return None
     lines = re.split(r"\r\n|\n|\r", text)
-    is_cut = len(head) == settings.bytes_of_a_head and len(lines) > 1
+    is_cut = len(head) == BYTES_OF_A_HEAD and len(lines) > 1
     return encoding, tuple(lines[:-1] if is_cut or not lines[-1] else lines)
 
 
@@ -283,13 +286,20 @@ def _is_row(cells: list[str], numeric: list[bool], words: bool) -> bool:
     return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
 
 
+LINES_OF_A_HEAD = 1000
+"""Number of first lines of a text file that are tried with each delimiter."""
+
+COLUMNS_OF_A_TABLE = 2000
+"""Largest number of columns of a table. Asking more for their roles takes ten seconds."""
+
+
 def layout(path: Path) -> TextLayout:
     """Find the layout of a text file with one table of numbers.
 
     Words are accepted in its rows only if nearly all rows have some. Raises LogError if there is no table.
     """
     encoding, lines = decoded_head(path)
-    lines = lines[: settings.lines_of_a_head]
+    lines = lines[:LINES_OF_A_HEAD]
     fits = _best_fit(encoding, tuple(lines))
     if fits is not None:
         best, rival = fits[0].layout, fits[1]
@@ -299,8 +309,8 @@ def layout(path: Path) -> TextLayout:
             expected = "a heading for every column, or another delimiter than the sign that groups thousands"
             raise LogError("log", actual, expected, "1,234.5;0.5 or 1234.5,0.5", str(path))
         _no_number_in_parts(lines, best, path)
-        if best.columns > settings.columns_of_a_table:
-            expected = f"at most {settings.columns_of_a_table}: one a channel, one row a sample"
+        if best.columns > COLUMNS_OF_A_TABLE:
+            expected = f"at most {COLUMNS_OF_A_TABLE}: one a channel, one row a sample"
             raise LogError("log", f"{best.columns} columns", expected, "", str(path))
         _no_open_quote(lines[: best.first], best.delimiter, path)
         return best
@@ -406,12 +416,16 @@ def _fit(lines: Sequence[str], encoding: str, delimiter: str, rows: list[list[st
     return _Fit(len(below), all(names) and bool(names), columns, grouped, form)
 
 
+ROWS_OF_A_TABLE_BEGUN = 50
+"""Number of rows within which another one has the length of the first row of a table."""
+
+
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
     """Tell whether a row of numbers is followed by a row of numbers, and some row of equal length, as in a table.
 
     Rows of several topics differ in length, but each kind comes again.
     """
-    following = [j for j in range(i + 1, len(rows)) if any(rows[j])][: settings.rows_of_a_table_begun]
+    following = [j for j in range(i + 1, len(rows)) if any(rows[j])][:ROWS_OF_A_TABLE_BEGUN]
     if not following or not any(is_row[i + 1 :]):
         return True
     length = len(_filled(rows[i]))

@@ -21,7 +21,6 @@ import pandas as pd
 from friso.errors import LogError
 from friso.identification.logs.log import Channel, ChannelTable, unique
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.settings import settings
 from friso.identification.logs.sniff import (
     CLOCK,
     DECIMAL_SIGNS,
@@ -264,6 +263,10 @@ class Preamble:
     read: tuple[str, ...] = ()
 
 
+CHARACTERS_OF_AN_AMOUNT = 100
+"""Longest text that is read as an amount with its unit."""
+
+
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal: str = ".") -> Preamble:
     """Read the lines above a table with columns of the given names, and its delimiter and decimal sign.
 
@@ -280,7 +283,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal
     for line, stated, value in pairs:
         name, unit = split_heading(stated)
         key = _letters(name)
-        asked = key in RATES | STEPS and len(value) < settings.characters_of_an_amount
+        asked = key in RATES | STEPS and len(value) < CHARACTERS_OF_AN_AMOUNT
         amount = _AMOUNT.fullmatch(value) if asked else None
         grouped = amount and _GROUPED.fullmatch(amount["number"])
         if amount is None or (grouped and not grouped["sign"] == decimal == "."):
@@ -508,6 +511,11 @@ def _time_of_day(texts: Any) -> np.ndarray:
     return 3600 * hours + 60 * minutes + seconds + fractions
 
 
+SHARE_OF_CELLS_OF_OTHER_TOPICS = 0.25
+"""Share of empty cells above which rows belong to several topics with instants of their own. Two topics of equal
+rates leave half of the cells empty."""
+
+
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
     """Return the columns without the empty cells below their last value.
 
@@ -517,7 +525,7 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
     out, sparse = [], False
     for column in columns:
         last = int(np.flatnonzero(~np.isnan(column.values))[-1]) + 1
-        sparse = sparse or bool(np.isnan(column.values[:last]).mean() > settings.share_of_cells_of_other_topics)
+        sparse = sparse or bool(np.isnan(column.values[:last]).mean() > SHARE_OF_CELLS_OF_OTHER_TOPICS)
         out.append(replace(column, values=column.values[:last]))
     if (
         not sparse

@@ -11,7 +11,6 @@ from scipy.interpolate import CubicSpline
 
 from friso.errors import LogError
 from friso.identification.logs.checks import repeated_stamps, runs
-from friso.identification.logs.settings import settings
 from friso.quantities import percent
 
 
@@ -33,6 +32,26 @@ class Track:
     as_even: Track | None = None
 
 
+DEVIATIONS_OF_A_GAP = 4.0
+"""Deviation of a gap from whole sample times that scatter explains, in standard deviations of other steps."""
+
+SCATTER_OF_EVEN_STAMPS = 0.01
+"""Scatter of time stamps below which they count as even, relative to the sample time."""
+
+ERROR_OF_A_WHOLE_GAP = 0.25
+"""Largest deviation of a gap from a whole number of sample times, relative to the sample time."""
+
+SAMPLES_BRIDGED = 3
+"""Largest number of lost samples in a row that are interpolated. Longer gaps split a record."""
+
+SHARE_OF_GAPS = 0.1
+"""Ratio of gaps to samples above which sampling counts as uneven. Gaps between even time stamps
+that are filled do not count."""
+
+SAMPLE_TIMES_OF_A_GAP = 1.5
+"""Smallest time step that is a gap, in sample times. One missing sample makes 2."""
+
+
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     """Clean a channel, and put it on even instants.
 
@@ -50,14 +69,14 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     long = gaps(steps)
     period = usual_step(steps)
     lost = np.round(steps / period) - 1
-    usual_scatter = settings.deviations_of_a_gap * float(np.std(steps[~long])) / period
-    scatter = min(max(settings.scatter_of_even_stamps, usual_scatter), settings.error_of_a_whole_gap)
+    usual_scatter = DEVIATIONS_OF_A_GAP * float(np.std(steps[~long])) / period
+    scatter = min(max(SCATTER_OF_EVEN_STAMPS, usual_scatter), ERROR_OF_A_WHOLE_GAP)
     whole = np.abs(steps / period - 1 - lost) <= scatter  # otherwise the clock was reset
-    bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
-    even = np.abs(steps / period - 1 - lost).max() <= settings.scatter_of_even_stamps
+    bridged = long & whole & (lost >= 1) & (lost <= SAMPLES_BRIDGED)
+    even = np.abs(steps / period - 1 - lost).max() <= SCATTER_OF_EVEN_STAMPS
     uneven = float((long & ~bridged).mean() if even else long.mean())
-    if uneven > settings.share_of_gaps:
-        usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
+    if uneven > SHARE_OF_GAPS:
+        usual = f"{SAMPLE_TIMES_OF_A_GAP} times the usual {np.median(steps):.4g} s"
         actual = f"time stamps with {percent(uneven)} of the steps over {usual}"
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "NUMBER ms"')
     edges = [0, *(np.flatnonzero(long & ~bridged) + 1).tolist(), time.size]
@@ -68,6 +87,14 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     return _evened(name, Track(time, values, period, [slice(a, b) for a, b in pairwise(ends)], filled, read))
 
 
+SAMPLES_OF_A_LOG = 50
+"""Fewest samples of a log; no interval from fewer would be meaningful (friso's choice)."""
+
+SCATTER_OF_UNEVEN_STAMPS = 0.15
+"""RMS deviation of the steps from whole numbers of the usual step, relative to it, above which a log has no even
+clock. Interpolation onto one then loses more than the motion's corners; steps at random have 0.29."""
+
+
 def is_uneven(time: np.ndarray) -> bool:
     """Tell whether instants [s] belong to no even clock: their steps are no whole numbers of a usual one.
 
@@ -75,12 +102,12 @@ def is_uneven(time: np.ndarray) -> bool:
     """
     steps = np.diff(time[np.isfinite(time)])
     steps = steps[steps > 0]
-    if steps.size < settings.samples_of_a_log:
+    if steps.size < SAMPLES_OF_A_LOG:
         return False
     whole = steps / np.median(steps)
     off = whole - np.round(whole)
-    rounded = np.unique(np.round(whole / settings.scatter_of_even_stamps)).size <= 2
-    return bool(not rounded and np.sqrt(np.mean(off**2)) > settings.scatter_of_uneven_stamps)
+    rounded = np.unique(np.round(whole / SCATTER_OF_EVEN_STAMPS)).size <= 2
+    return bool(not rounded and np.sqrt(np.mean(off**2)) > SCATTER_OF_UNEVEN_STAMPS)
 
 
 def as_stamped(signals: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[Track, dict[str, np.ndarray]]:
@@ -110,6 +137,10 @@ def usual_step(steps: np.ndarray) -> float:
     return float(steps[~gaps(steps)].mean())
 
 
+STEPS_AVERAGED = 5
+"""Number of steps in a row that are averaged for the usual step, because coarse stamps scatter."""
+
+
 def gaps(steps: np.ndarray) -> np.ndarray:
     """Tell which time steps, shape (n,), are gaps: longer than a few usual steps.
 
@@ -117,7 +148,7 @@ def gaps(steps: np.ndarray) -> np.ndarray:
     gap.
     """
     usual = float(np.median(steps))
-    averaged, longest = settings.steps_averaged, settings.sample_times_of_a_gap
+    averaged, longest = STEPS_AVERAGED, SAMPLE_TIMES_OF_A_GAP
     if steps.size >= averaged:
         usual = float(np.median(np.convolve(steps, np.ones(averaged), "valid"))) / averaged
     beside = np.pad(np.minimum(steps, longest * usual), 1, constant_values=usual)
@@ -141,6 +172,10 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
     return np.insert(time, places + 1, instants), np.insert(values, places + 1, made_up), filled
 
 
+STEPS_OF_A_TOPIC = 10.0
+"""Longest step between samples of a topic in rows of several, in its usual steps. A longer one is a hole."""
+
+
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return the samples that are numbers, and how many samples between them are not.
 
@@ -151,7 +186,7 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
     if finite.size < 2:
         raise LogError(name, f"{finite.size} sample{'' if finite.size == 1 else 's'}", "a record over time", "")
     steps = np.diff(time[finite])
-    even = steps.size > 1 and (steps >= 0).all() and steps.max() <= settings.steps_of_a_topic * np.median(steps)
+    even = steps.size > 1 and (steps >= 0).all() and steps.max() <= STEPS_OF_A_TOPIC * np.median(steps)
     if finite.sum() < (2 if even else max(2, 0.5 * finite.size)):
         actual = f"{finite.size - finite.sum()} of {finite.size} samples that are not numbers (NaN)"
         raise LogError(name, actual, "at least half of the samples", "")
@@ -176,10 +211,10 @@ def _evened(name: str, raw: Track) -> Track:
     jitter = np.sqrt(scatter / time.size) / raw.period
     sampled = f"{time.size} samples at {1 / raw.period:.6g} Hz"
     raw.read.append(f"{name}: {sampled}, time stamps even to {percent(jitter)} of a step")
-    rounded = _rounded(raw, time) if jitter > settings.scatter_of_even_stamps else 0.0
+    rounded = _rounded(raw, time) if jitter > SCATTER_OF_EVEN_STAMPS else 0.0
     if rounded:
         raw.read.append(f"{name}: time stamps are rounded to {rounded * 1e3:.4g} ms: taken as uniform")
-    if rounded or jitter <= settings.scatter_of_even_stamps:
+    if rounded or jitter <= SCATTER_OF_EVEN_STAMPS:
         raw.time = time
         return raw
     raw.warnings.append(
@@ -217,9 +252,13 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
         return 0.0
     lower, upper = float(np.median(steps[short])), float(np.median(steps[~short]))
     digit = upper - lower
-    of_two = np.minimum(np.abs(steps - lower), np.abs(steps - upper)) <= settings.scatter_of_even_stamps * digit
-    near = np.abs(raw.time - even) <= (1 + settings.scatter_of_even_stamps) * digit
+    of_two = np.minimum(np.abs(steps - lower), np.abs(steps - upper)) <= SCATTER_OF_EVEN_STAMPS * digit
+    near = np.abs(raw.time - even) <= (1 + SCATTER_OF_EVEN_STAMPS) * digit
     return digit if of_two.all() and near[~raw.bridged].all() else 0.0
+
+
+SAMPLES_OF_A_SEGMENT = 10
+"""Fewest samples of a segment. No filter settles within fewer."""
 
 
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
@@ -242,7 +281,7 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
         if not _coincident(base, single):
             instants = f"the {1 / base.period:.6g} Hz instants of {base_name}"
             read.append(f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto {instants}")
-        if single.period < base.period / settings.sample_times_of_a_gap:
+        if single.period < base.period / SAMPLE_TIMES_OF_A_GAP:
             warnings.append(
                 f"{name}: sampled at {1 / single.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
                 "anti-aliasing filter"
@@ -251,14 +290,14 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
     segments = [
         slice(part.start + run.start, part.start + run.stop) for part in base.segments for run in runs(covered[part])
     ]
-    short = [run for run in segments if run.stop - run.start < settings.samples_of_a_segment]
-    segments = [run for run in segments if run.stop - run.start >= settings.samples_of_a_segment]
+    short = [run for run in segments if run.stop - run.start < SAMPLES_OF_A_SEGMENT]
+    segments = [run for run in segments if run.stop - run.start >= SAMPLES_OF_A_SEGMENT]
     if not segments:
         spans = ", ".join(f"{name} {trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" for name, trace in tracks.items())
-        consecutive = f"no {settings.samples_of_a_segment} consecutive samples that all channels share"
+        consecutive = f"no {SAMPLES_OF_A_SEGMENT} consecutive samples that all channels share"
         raise LogError("log", f"{consecutive}: {spans}", "a common span", "")
     if short:
-        read.append(f"{len(short)} segments shorter than {settings.samples_of_a_segment} samples left out")
+        read.append(f"{len(short)} segments shorter than {SAMPLES_OF_A_SEGMENT} samples left out")
     ends = np.cumsum([0, *(run.stop - run.start for run in segments)]).tolist()
     parts = [slice(start, stop) for start, stop in pairwise(ends)]
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
@@ -269,7 +308,7 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
 def _same_instants(first: Track, second: Track) -> bool:
     """Tell whether two tracks have the same instants, to a hundredth of a sample time."""
     same = first.time.size == second.time.size and first.segments == second.segments
-    return same and bool(np.all(np.abs(first.time - second.time) <= settings.scatter_of_even_stamps * second.period))
+    return same and bool(np.all(np.abs(first.time - second.time) <= SCATTER_OF_EVEN_STAMPS * second.period))
 
 
 def _coincident(base: Track, other: Track) -> bool:
@@ -277,13 +316,13 @@ def _coincident(base: Track, other: Track) -> bool:
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period
-    return bool(np.all(np.abs(steps - np.round(steps)) <= settings.scatter_of_even_stamps))
+    return bool(np.all(np.abs(steps - np.round(steps)) <= SCATTER_OF_EVEN_STAMPS))
 
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
     """Return values of a track, (n,), at the instants of the base; NaN outside its segments."""
     resampled = np.full(base.time.size, np.nan)
-    slack = settings.scatter_of_even_stamps * other.period
+    slack = SCATTER_OF_EVEN_STAMPS * other.period
     for part in other.segments:
         time = other.time[part]
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))

@@ -18,7 +18,6 @@ import numpy as np
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
-from friso.identification.logs.settings import settings
 from friso.quantities import Quantity, any_sign, quoted
 
 
@@ -104,12 +103,16 @@ def without_accents(name: str) -> str:
     return "".join(sign for sign in unicodedata.normalize("NFD", name) if not unicodedata.combining(sign))
 
 
+CHARACTERS_OF_A_UNIT = 100
+"""Longest text of a unit."""
+
+
 def spelled(text: str) -> str:
     """Convert a unit text to the spelling of `friso.quantities`; "" for none.
 
     "m/s2" becomes "m/s^2", "µm" "um", "sec" "s". A text too long for a unit stays.
     """
-    if len(text) > settings.characters_of_a_unit:
+    if len(text) > CHARACTERS_OF_A_UNIT:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")

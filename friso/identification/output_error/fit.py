@@ -19,13 +19,19 @@ from scipy.stats import chi2, norm, qmc
 from scipy.stats import t as student
 
 from friso.engine.batch import Inputs
-from friso.identification.combine import UPPER_PROBABILITY, binned, correlation_length, groups_of, spread_of
+from friso.identification.combine import (
+    BINS_OF_PLACE_AND_SPEED,
+    UPPER_PROBABILITY,
+    binned,
+    correlation_length,
+    groups_of,
+    spread_of,
+)
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import BRISTLES, FitParameter, stages
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import digit_of, noise_of
-from friso.identification.settings import identification_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
 
@@ -39,6 +45,19 @@ class Refined:
 
     inner: np.ndarray
     cost: np.ndarray
+
+
+RANGE_SHARE_INSIDE = 1e-9
+"""Smallest distance of a fitted number from the ends of its range, relative to the range."""
+
+FIRST_DAMPING = 1e-2
+"""Levenberg-Marquardt damping of the first step, relative to the curvature."""
+
+HIGHEST_DAMPING = 1e3
+"""Levenberg-Marquardt damping at which a fit that does not improve is abandoned."""
+
+SHARE_OF_PREDICTED_FALL = 0.5
+"""Fall of the sum of squares, relative to its prediction, below which derivatives are computed anew."""
 
 
 def refine_fit(
@@ -63,12 +82,12 @@ def refine_fit(
     its last iteration is abandoned. Only derivatives computed at its own numbers end or abandon a fit.
     """
     (low, high), free = pieces[0].bounds, np.broadcast_to(free, starts.shape)
-    margin = settings.range_share_inside * (high - low)
+    margin = RANGE_SHARE_INSIDE * (high - low)
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
     rest = _residuals(pieces, inner)
     cost = mean_square(rest)
-    damping = np.full(len(inner), settings.first_damping)
+    damping = np.full(len(inner), FIRST_DAMPING)
     busy = np.isfinite(cost)
     near = np.full((rest.shape[1], inner.shape[1]), np.nan) if slopes is None else slopes
     slopes = np.where(free[:, None, :], near, 0.0)
@@ -77,7 +96,7 @@ def refine_fit(
         progress(iteration, iterations, "")
         anew = np.flatnonzero(busy & asked)
         slopes[anew], exact[anew] = _derivatives(pieces, inner[anew], free[anew], rest[anew]), True
-        busy &= np.all(np.isfinite(slopes), axis=(1, 2)) & (damping < settings.highest_damping)
+        busy &= np.all(np.isfinite(slopes), axis=(1, 2)) & (damping < HIGHEST_DAMPING)
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
@@ -87,7 +106,7 @@ def refine_fit(
         fallen = cost[rows] - step.cost
         better, slow = fallen > 0, fallen < enough * cost[rows]
         late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
-        poor = fallen < settings.share_of_predicted_fall * (cost[rows] - step.predicted)
+        poor = fallen < SHARE_OF_PREDICTED_FALL * (cost[rows] - step.predicted)
         raised = np.where(
             exact[rows],
             damping[rows] * TRIED_DAMPINGS[-1] * (TRIED_DAMPINGS[1] / TRIED_DAMPINGS[0]) / TRIED_DAMPINGS[0],
@@ -201,6 +220,16 @@ def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> n
     return np.linalg.solve(damped, downhill[:, None, :, None])[..., 0]
 
 
+NOISE_RATIO_OF_A_CLOSED_FIT = 1.2
+"""Ratio of residual to noise up to which a closed-loop fit is judged by its noise alone."""
+
+NOISE_RATIO_OF_AN_EXPLAINED_RECORD = 2.0
+"""Largest ratio of residual to noise of a fit that explains its record."""
+
+WIDEST_LOGARITHM = 0.7
+"""Half-width of a 95 % interval, in the logarithm, beyond which a parameter counts as not determined."""
+
+
 @dataclass(frozen=True)
 class OutputErrorFit:
     """A fit of the whole model to a log, with the uncertainty of its numbers.
@@ -231,7 +260,7 @@ class OutputErrorFit:
         With `closely`, the limit is tighter. For a stage that follows the log, only a part of the noise passes into the
         residual.
         """
-        times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
+        times = NOISE_RATIO_OF_A_CLOSED_FIT if closely else NOISE_RATIO_OF_AN_EXPLAINED_RECORD
         return self.left < times * self.problem.noise_left(noise)
 
     @property
@@ -245,7 +274,7 @@ class OutputErrorFit:
         bounded = set()
         for number, deviation in zip(self.free, self.deviation, strict=True):
             parameter = self.problem.parameters[number]
-            most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
+            most = WIDEST_LOGARITHM if parameter.logarithmic else (parameter.high - parameter.low) / 2
             bounded |= {number} if NORMAL_COVERAGE * deviation < most else set()
         return bounded
 
@@ -310,6 +339,16 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
     return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
+ITERATIONS_OF_FIRST_STARTS = 5
+"""Number of iterations of the brief refinement, which shows how good a start is."""
+
+ITERATIONS_OF_FURTHER_STARTS = 7
+"""Number of further iterations of the starts kept after the brief refinement."""
+
+COST_SHARE_OF_REFINEMENT = 1e-4
+"""Relative decrease of the sum of squares per iteration at which a fit ends by default."""
+
+
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """Fit the `free` parameters of a problem, given by index, from several starts.
 
@@ -325,15 +364,26 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Pro
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
     rounds = (
-        (rough, settings.starts_refined_first, settings.iterations_of_first_starts),
-        ([problem], settings.starts_refined_further, settings.iterations_of_further_starts),
+        (rough, settings.starts_refined_first, ITERATIONS_OF_FIRST_STARTS),
+        ([problem], settings.starts_refined_further, ITERATIONS_OF_FURTHER_STARTS),
     )
-    enough = settings.cost_share_of_refinement
+    enough = COST_SHARE_OF_REFINEMENT
     for number, (parts, most, iterations) in enumerate(rounds):
         tried, part = tried[:most], share_of(progress, number, 3)
         refined = refine_fit(parts, tried, mask, iterations, enough, part)
         tried = refined.inner[np.argsort(refined.cost)]
     return polished(problem, tuple(free), tried[0], share_of(progress, 2, 3))
+
+
+RANGE_SHARE_OF_CORE_STARTS = 0.02
+"""Largest distance of a start from the inverse model's value, relative to the range, for parameters that may be
+0."""
+
+LOGARITHM_OF_CORE_STARTS = 0.3
+"""Largest distance of starting masses and frictions from the inverse model's values, in the logarithm."""
+
+SEED_OF_STARTS = 7
+"""Random seed of the starts, which makes results repeatable."""
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
@@ -347,15 +397,19 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     low, high = problem.bounds
     core = np.array([parameter.core for parameter in problem.parameters])
     logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
-    centre, spread = first_values(problem.parameters), settings.range_share_of_core_starts * (high - low)
-    half = np.where(logarithmic, settings.logarithm_of_core_starts, spread)
+    centre, spread = first_values(problem.parameters), RANGE_SHARE_OF_CORE_STARTS * (high - low)
+    half = np.where(logarithmic, LOGARITHM_OF_CORE_STARTS, spread)
     low = np.where(core, np.maximum(centre - half, low), low)
     high = np.where(core, np.minimum(centre + half, high), high)
-    shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
+    shares = qmc.Sobol(len(first), rng=SEED_OF_STARTS).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
     half = len(starts) // 2  # of a Sobol sequence, either half is spread evenly, but not every second point
     starts[:half] = np.where(core, first, starts[:half])
     return np.vstack([first, starts])
+
+
+DEVIATIONS_OF_NEAR_STARTS = 3.0
+"""Spread of the starts around an earlier fit, in that fit's standard deviations."""
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
@@ -370,8 +424,8 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     correlation = np.eye(len(fit.free))
     part = fit.covariance[np.ix_(usable, usable)]
     correlation[np.ix_(usable, usable)] = part / np.outer(deviation[usable], deviation[usable])
-    spread = np.minimum(settings.deviations_of_near_starts * np.where(usable, deviation, np.inf), (high - low) / 4)
-    rows = np.random.default_rng(settings.seed_of_starts).multivariate_normal(
+    spread = np.minimum(DEVIATIONS_OF_NEAR_STARTS * np.where(usable, deviation, np.inf), (high - low) / 4)
+    rows = np.random.default_rng(SEED_OF_STARTS).multivariate_normal(
         np.zeros(len(spread)), correlation, settings.starts_near_a_fit, method="eigh"
     )
     starts = np.tile(fit.inner, (settings.starts_near_a_fit + 1, 1))
@@ -395,18 +449,33 @@ def _best_starts(problem: Problem, pieces: Sequence[slice], starts: np.ndarray, 
     return np.vstack([starts[0], starts[1:][best]])
 
 
+SAMPLES_OF_ALL_STARTS = 6e6
+"""Total number of samples simulated for all starts together. Longer records are cut."""
+
+STRETCHES_OF_A_SCREENING = 8
+"""Stretches into which a long record is cut for its starts, because slow motion may occur anywhere."""
+
+
 def _parts(problem: Problem, starts: int) -> list[slice]:
     """Return the stretches of a record over which `starts` starts are simulated.
 
     A short record is used whole. Of a long one in closed loop the beginning is used, because its later state is
     unknown; otherwise stretches from all over it, because slow motion may come last.
     """
-    count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
+    count, most = len(problem.target), int(SAMPLES_OF_ALL_STARTS / starts)
     if count <= most or problem.closed:
         return [slice(0, min(count, most))]
-    length = most // settings.stretches_of_a_screening
-    firsts = np.linspace(0, count - length, settings.stretches_of_a_screening).astype(int)
+    length = most // STRETCHES_OF_A_SCREENING
+    firsts = np.linspace(0, count - length, STRETCHES_OF_A_SCREENING).astype(int)
     return [slice(int(first), int(first) + length) for first in firsts]
+
+
+ITERATIONS_OF_A_FIT = 30
+"""Largest number of iterations of the best start. Fits that need more are on a ridge."""
+
+COST_SHARE_OF_A_FIT = 1e-6
+"""Relative decrease of the sum of squares per iteration at which the best fit ends. Larger values stop too
+early."""
 
 
 def polished(
@@ -423,7 +492,7 @@ def polished(
     for the other inputs that the log allows (`problem.unsettled`).
     """
     mask = np.isin(np.arange(len(inner)), free)
-    until = settings.iterations_of_a_fit, settings.cost_share_of_a_fit
+    until = ITERATIONS_OF_A_FIT, COST_SHARE_OF_A_FIT
     best = refine_fit([problem], inner[None], mask, *until, progress, slopes=slopes).inner[0]
     rest, fitted = problem.linearised(best, mask)
     covariance = spread_along(problem, fitted, rest)
@@ -478,6 +547,10 @@ def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.nda
     return shift_against(change, slopes)
 
 
+SMALLEST_SINGULAR_VALUE = 1e-3
+"""Ratio of a singular value of the Jacobian to the largest, below which parameters cannot be distinguished."""
+
+
 def shift_against(change: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """Return the shift of fitted numbers, (p,), that best undoes a change of the residual [N], (n,).
 
@@ -485,7 +558,11 @@ def shift_against(change: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """
     size = np.linalg.norm(slopes, axis=0)
     size = np.where(size > 0, size, 1.0)
-    return -np.linalg.lstsq(slopes / size, change, rcond=settings.smallest_singular_value)[0] / size
+    return -np.linalg.lstsq(slopes / size, change, rcond=SMALLEST_SINGULAR_VALUE)[0] / size
+
+
+PROBABILITY_OF_AN_EFFECT = 0.999
+"""Confidence with which one explanation of a record must be better before the other is dropped."""
 
 
 @dataclass(frozen=True)
@@ -512,7 +589,7 @@ class ExplainedResidual:
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)
         covariance = spread_along(fit.problem, self.slopes[:, usable], self.rest)
-        chance = 1 - settings.probability_of_an_effect
+        chance = 1 - PROBABILITY_OF_AN_EFFECT
         deviations = np.sqrt(np.diag(covariance)[-len(self.sizes) :])
         return np.abs(self.sizes) > norm.isf(chance / 2) * deviations
 
@@ -544,11 +621,11 @@ def explained_by(
     if not (usable[slopes.shape[1] :].all() and np.isfinite(rest).all()):
         return None
     solution = np.zeros(len(size))
-    scaled, smallest = every[:, usable] / size[usable], settings.smallest_singular_value**2
+    scaled, smallest = every[:, usable] / size[usable], SMALLEST_SINGULAR_VALUE**2
     solution[usable] = np.linalg.lstsq(scaled.T @ scaled, -rest @ scaled, rcond=smallest)[0] / size[usable]
     left = rest + every[:, usable] @ solution[usable]
     independent = max(float(counted.sum()), 1.0) / correlation_length(left)
-    chance = chi2.isf((1 - settings.probability_of_an_effect) / searched, len(effects))
+    chance = chi2.isf((1 - PROBABILITY_OF_AN_EFFECT) / searched, len(effects))
     if rest @ rest <= left @ left * (1 + chance / independent):
         return None
     moved, sizes = np.split(solution, [slopes.shape[1]])
@@ -578,7 +655,7 @@ def beside_all_numbers(fit: OutputErrorFit, further: Sequence[np.ndarray] = ()) 
     size = np.linalg.norm(slopes, axis=0)
     usable = np.isfinite(size) & (size > 0)
     scaled = slopes[:, usable] / size[usable]
-    solution = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0]
+    solution = np.linalg.lstsq(scaled, -rest, rcond=SMALLEST_SINGULAR_VALUE)[0]
     return rest + scaled @ solution, slopes
 
 
@@ -598,6 +675,16 @@ def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: Output
     return [*(pushed.residuals(np.tile(fit.inner, (len(forces), 1))) - rest) / sizes]
 
 
+SEED_OF_REPETITIONS = 11
+"""Random seed of the noise of simulated logs, which makes results repeatable."""
+
+REPETITIONS_OF_A_FIT = 4
+"""Number of simulated logs on which a fit is repeated. With 4, Student's t is 1.4 times the normal quantile."""
+
+ITERATIONS_OF_A_REPETITION = 15
+"""Number of iterations of a repeated fit, which starts from the true values."""
+
+
 def as_far_off_as_repeated(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> OutputErrorFit:
@@ -609,15 +696,15 @@ def as_far_off_as_repeated(
 
     If the residual of the log exceeds the residuals of the simulated logs, errors are scaled up by the ratio.
     """
-    free, rng = np.isin(np.arange(len(once.inner)), once.free), np.random.default_rng(settings.seed_of_repetitions)
+    free, rng = np.isin(np.arange(len(once.inner)), once.free), np.random.default_rng(SEED_OF_REPETITIONS)
     again = []
-    for number in range(settings.repetitions_of_a_fit):
-        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
+    for number in range(REPETITIONS_OF_A_FIT):
+        progress(number, REPETITIONS_OF_A_FIT, "moves: the same fit of simulated logs")
         like = simulated_log(once.problem, once.inner, log, part, bandwidth, noise, rng)
-        until = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
+        until = ITERATIONS_OF_A_REPETITION, COST_SHARE_OF_REFINEMENT
         again.append(refine_fit([like], once.inner[None], free, *until, slopes=once.slopes))
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
-    off = off * float(student.ppf(UPPER_PROBABILITY, settings.repetitions_of_a_fit)) / NORMAL_COVERAGE
+    off = off * float(student.ppf(UPPER_PROBABILITY, REPETITIONS_OF_A_FIT)) / NORMAL_COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
     off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
     return once.with_deviations(np.maximum(off, once.deviation))
@@ -683,6 +770,6 @@ def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random
     motion is steady and do not average out as noise does. Rounding the force of the fit again would not show them: its
     levels are those that the rounded log has.
     """
-    levels = np.stack([np.rint(np.abs(force) / digit), binned(speed, identification_settings.bins_of_place_and_speed)])
+    levels = np.stack([np.rint(np.abs(force) / digit), binned(speed, BINS_OF_PLACE_AND_SPEED)])
     alike = np.unique(levels, axis=1, return_inverse=True)[1].ravel()
     return digit * np.sign(force) * (rng.random(alike.max() + 1) - 0.5)[alike]

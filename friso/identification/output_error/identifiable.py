@@ -19,6 +19,8 @@ from friso.axis import axis_of
 from friso.identification.inverse_model import FilteredMotion
 from friso.identification.logs.checks import runs
 from friso.identification.output_error.fit import (
+    NOISE_RATIO_OF_A_CLOSED_FIT,
+    PROBABILITY_OF_AN_EFFECT,
     OutputErrorFit,
     Refined,
     everywhere,
@@ -36,6 +38,21 @@ from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import low_pass, turns_of
 from friso.progress import Progress, between, silent
+
+SPEED_FACTOR_OF_COVERAGE = 3.0
+"""Factor below and above the Stribeck velocity within which a record must move steadily to show it."""
+
+SPEED_SHARE_OF_REST = 1e-4
+"""Speed that is told as rest, relative to the highest steady one. No stage moves over more than four decades."""
+
+DEVIATIONS_OF_A_BEND = 5.0
+"""Smallest visible bend of bristles, in standard deviations of the position's noise."""
+
+SAMPLES_OF_A_BEND = 5
+"""Fewest samples that must show the bristles bending at the start of a motion."""
+
+STARTS_WITH_A_BEND = 3
+"""Fewest starts of motion with visible bending. One may be chance."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +75,8 @@ class Coverage:
         Friction falls around the Stribeck velocity; steady motion on one side of this velocity alone does not show the
         fall.
         """
-        below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
-        above = (self.steady > speed) & (self.steady <= speed * settings.speed_factor_of_coverage)
+        below = (self.steady >= speed / SPEED_FACTOR_OF_COVERAGE) & (self.steady < speed)
+        above = (self.steady > speed) & (self.steady <= speed * SPEED_FACTOR_OF_COVERAGE)
         return bool(below.any() and above.any())
 
     @property
@@ -69,7 +86,7 @@ class Coverage:
         The range lies between neighbouring steady speeds, or below the lowest. If there is no steady motion at all, its
         upper end is infinite. Speeds far below the highest count as rest, however little noise there is.
         """
-        slowest = max(self.slowest, settings.speed_share_of_rest * float(self.steady.max(initial=0.0)))
+        slowest = max(self.slowest, SPEED_SHARE_OF_REST * float(self.steady.max(initial=0.0)))
         faster = self.steady[self.steady > slowest]
         speeds = np.concatenate([[slowest], faster]) if faster.size else np.array([slowest, np.inf])
         widest = int(np.argmax(speeds[1:] / speeds[:-1]))
@@ -81,9 +98,16 @@ class Coverage:
         The bend must stand out of the noise of the position over several samples of several starts, because one start
         may be chance.
         """
-        least = settings.deviations_of_a_bend * self.resolution
+        least = DEVIATIONS_OF_A_BEND * self.resolution
         passes = [np.sum((distance > least) & (distance < length)) for distance in self.starts]
-        return bool(sum(count >= settings.samples_of_a_bend for count in passes) >= settings.starts_with_a_bend)
+        return bool(sum(count >= SAMPLES_OF_A_BEND for count in passes) >= STARTS_WITH_A_BEND)
+
+
+TIME_OF_STEADY_MOTION = 0.02  # [s]
+"""Shortest stretch of steady motion. Shorter stretches show no speed above the noise."""
+
+FRICTION_SHARE_OF_INERTIA = 0.5
+"""Largest inertia force in motion that counts as steady, relative to Coulomb friction."""
 
 
 def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
@@ -97,15 +121,15 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
     steps = np.abs(np.diff(position))
     quantum = steps[steps > 0].min() if (steps > 0).any() else 0.0
     resolution = max(float(np.std(rough)), float(quantum) / np.sqrt(12))
-    length = max(1, round(settings.time_of_steady_motion / sample_time))
+    length = max(1, round(TIME_OF_STEADY_MOTION / sample_time))
     slowest = resolution / (length * sample_time)
-    calm = (mass * np.abs(moved.acceleration) < settings.friction_share_of_inertia * coulomb) & (
+    calm = (mass * np.abs(moved.acceleration) < FRICTION_SHARE_OF_INERTIA * coulomb) & (
         np.abs(moved.velocity) > slowest
     )
     stretches = [stretch for stretch in runs(calm) if stretch.stop - stretch.start >= length]
     speeds = [_speeds(np.abs(moved.velocity[stretch]), length) for stretch in stretches]
     steady = np.sort(np.concatenate(speeds)) if speeds else np.zeros(0)
-    starts = _starts(position, moved, mass / coulomb, settings.deviations_of_a_bend * resolution)
+    starts = _starts(position, moved, mass / coulomb, DEVIATIONS_OF_A_BEND * resolution)
     return Coverage(steady, starts, resolution, slowest)
 
 
@@ -117,7 +141,7 @@ def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, 
     show the bristles there. `mass_per_force` is the mass over the Coulomb friction [kg/N].
     """
     ends = np.unique([0, *turns_of(position, swing)])
-    calm = mass_per_force * np.abs(moved.acceleration) < settings.friction_share_of_inertia
+    calm = mass_per_force * np.abs(moved.acceleration) < FRICTION_SHARE_OF_INERTIA
     pieces = zip(ends, [*ends[1:], len(position)], strict=True)
     return tuple(np.where(calm[a:b], np.abs(position[a:b] - position[a]), np.nan) for a, b in pieces)
 
@@ -236,6 +260,10 @@ def _identifiable_on_log(
     return replace(answer, fit=fit(full.problem, free, neutral[None], part))
 
 
+BETTER_FITS_BY_PROFILES = 3
+"""Largest number of times that a fit is replaced by a better one found in a profile."""
+
+
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
@@ -248,7 +276,7 @@ def believed(
     """
     names = full.problem.names
     profiles: dict[str, Profile] = {}
-    again = settings.better_fits_by_profiles
+    again = BETTER_FITS_BY_PROFILES
     while True:
         blurred = any(name in STRIBECK and not _sharp(full, seen) for name, seen in profiles.items())
         rest = {*names} - core - profiles.keys() - {*(CURVE if blurred else ())}
@@ -266,6 +294,14 @@ def believed(
     return IdentifiableFit(full, profiles, frozenset(_complete(shown, {*names} - core)))
 
 
+FURTHER_SEARCHES = 4
+"""Largest number of further searches, each of which follows another optimum."""
+
+COST_SHARE_OF_ANOTHER_OPTIMUM = 0.9
+"""Ratio of a new fit's sum of squares to the last one's below which it counts as another optimum, and a further
+search may pay."""
+
+
 def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
     """Search all parameters again from the mass and friction of a fit, as long as that finds another optimum.
 
@@ -274,19 +310,27 @@ def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
     three optima, and not yet right.
     """
     problem, free = full.problem, tuple(range(len(full.inner)))
-    for _ in range(settings.further_searches):
+    for _ in range(FURTHER_SEARCHES):
         before = full
         full = min(full, fit(problem, free, everywhere(problem, free, full.inner)), key=attrgetter("cost"))
-        if full.cost > settings.cost_share_of_another_optimum * before.cost:
+        if full.cost > COST_SHARE_OF_ANOTHER_OPTIMUM * before.cost:
             break
     return full
+
+
+PROBABILITY_OF_MORE_PARAMETERS = 0.99
+"""Confidence (F-test) with which parameters not determined singly must improve a fit together to be kept."""
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Tell whether a fit with more parameters, `full`, is better than `plain` beyond chance."""
     more = len(full.free) - len(plain.free)
-    chance = chi2.ppf(settings.probability_of_more_parameters, more) / full.independent
+    chance = chi2.ppf(PROBABILITY_OF_MORE_PARAMETERS, more) / full.independent
     return bool(plain.cost > full.cost * (1 + chance))
+
+
+RESIDUAL_RATIO_OUT_OF_STEP = 1.5
+"""Ratio of residuals above which a closed loop is out of step with the log."""
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
@@ -297,7 +341,7 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
     """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
-    return bool(powers[0] <= settings.residual_ratio_out_of_step**2 * powers[1])
+    return bool(powers[0] <= RESIDUAL_RATIO_OUT_OF_STEP**2 * powers[1])
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
@@ -337,11 +381,19 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     return parameter.unit != "" or name == SHARE
 
 
+FACTOR_OF_A_SHARP_PROFILE = 3.0
+"""Largest ratio of upper to lower end of the interval of a determined parameter."""
+
+
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
     """Tell whether a profile interval is closed on both sides and narrow."""
     parameter = full.problem.parameter(seen.name)
     closed = not (seen.open_low or seen.open_high)
-    return closed and (not parameter.logarithmic or seen.high < settings.factor_of_a_sharp_profile * seen.low)
+    return closed and (not parameter.logarithmic or seen.high < FACTOR_OF_A_SHARP_PROFILE * seen.low)
+
+
+SAMPLED_BRISTLE_FREQUENCY = 0.25
+"""Highest frequency of the mass on its bristles, times the sample time, that a log can show."""
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
@@ -355,7 +407,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     if name in BRISTLES:
         stiffness = full.value("friction.bristle_stiffness")
         swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
-        fast_enough = swings * full.problem.inputs.sample_time < settings.sampled_bristle_frequency
+        fast_enough = swings * full.problem.inputs.sample_time < SAMPLED_BRISTLE_FREQUENCY
         return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
     return True
 
@@ -366,7 +418,7 @@ def why_not_shown(name: str, covered: Coverage) -> str:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
-        if high > settings.speed_factor_of_coverage**2 * low:
+        if high > SPEED_FACTOR_OF_COVERAGE**2 * low:
             gap = f"between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s"
             return f"no steady motion {gap}, where the Stribeck effect would show"
     if name in BRISTLES:
@@ -406,8 +458,8 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished_again(fit, replace(problem, inputs=other, unsettled=(problem.inputs, *turned)))
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    unexplained = better.left > settings.noise_ratio_of_a_closed_fit * problem.noise_left(noise)
-    chance = chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
+    unexplained = better.left > NOISE_RATIO_OF_A_CLOSED_FIT * problem.noise_left(noise)
+    chance = chi2.ppf(PROBABILITY_OF_AN_EFFECT, 1) / better.independent
     if unexplained or worse.cost < better.cost * (1 + chance):
         return better
     return polished_again(better, replace(better.problem, unsettled=turned if better is swapped else sharper))
@@ -436,6 +488,13 @@ class Profile:
     open_high: bool
 
 
+DEVIATIONS_OF_A_PROFILE = 4.0
+"""First distance from the fit to which a profile reaches, in standard deviations."""
+
+WIDENING_OF_A_PROFILE = 5.0
+"""Factor by which a profile's reach grows whenever the interval's end lies beyond it."""
+
+
 def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
     """Compute the cost of a fit over values of one parameter, with others refitted at each.
 
@@ -448,7 +507,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
     parameter = fit.problem.parameters[number]
-    half = settings.deviations_of_a_profile * np.sqrt(spread) if spread > 0 else np.inf
+    half = DEVIATIONS_OF_A_PROFILE * np.sqrt(spread) if spread > 0 else np.inf
     while True:
         near, far = max(low, centre - half), min(high, centre + half)
         values = np.unique([*np.linspace(near, far, settings.points_of_a_profile), centre])
@@ -457,9 +516,14 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):
             break
-        half *= settings.widening_of_a_profile
+        half *= WIDENING_OF_A_PROFILE
     ends = float(parameter.outer(left)), float(parameter.outer(right))
     return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right), fits
+
+
+COST_SHARE_OF_A_PROFILE = 0.1
+"""Relative decrease of the excess cost per iteration at which a fit of a profile ends. Larger values end too
+early."""
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
@@ -478,7 +542,7 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
     inner, cost = np.where((follow < stay)[:, None], following, starts), np.minimum(stay, follow)
     away = ~np.isclose(values, fit.inner[number], rtol=0, atol=1e-6 * np.ptp(values))
     free = np.isin(np.arange(starts.shape[1]), others)
-    until = settings.iterations_of_a_profile, settings.cost_share_of_a_profile * WORSE / fit.independent
+    until = settings.iterations_of_a_profile, COST_SHARE_OF_A_PROFILE * WORSE / fit.independent
     refined = refine_fit([fit.problem], inner[away], free, *until, aim=limit, slopes=fit.slopes)
     inner[away], cost[away] = refined.inner, refined.cost
     return Refined(inner, cost)

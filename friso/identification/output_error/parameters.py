@@ -10,7 +10,6 @@ import numpy as np
 
 from friso.axis import LINEAR, AxisKind, axis_of
 from friso.errors import InputError
-from friso.identification.output_error.settings import settings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
@@ -49,15 +48,29 @@ class FitParameter:
         return np.exp(inner) if self.logarithmic else inner
 
 
+SHORTEST_BRISTLE_BEND = 5e-8  # [m]
+"""Smallest deflection of a bearing's bristles before they slip."""
+
+LONGEST_BRISTLE_BEND = 3e-4  # [m]
+"""Largest deflection of a bearing's bristles before they slip."""
+
+BEARING_RADII = (5e-3, 0.5)  # [m]
+"""Smallest and largest radius of rotary bearings, which convert bristle deflections to angles."""
+
+
 def bends(axis: AxisKind) -> tuple[float, float]:
     """Return the shortest and longest bend of bristles before sliding in a fit [m].
 
     On a rotary axis they are angles [rad], which follow from the largest and smallest bearing radii.
     """
     if axis == LINEAR:
-        return settings.shortest_bristle_bend, settings.longest_bristle_bend
-    smallest, largest = settings.bearing_radii
-    return settings.shortest_bristle_bend / largest, settings.longest_bristle_bend / smallest
+        return SHORTEST_BRISTLE_BEND, LONGEST_BRISTLE_BEND
+    smallest, largest = BEARING_RADII
+    return SHORTEST_BRISTLE_BEND / largest, LONGEST_BRISTLE_BEND / smallest
+
+
+HIGHEST_STRIBECK_VELOCITY = 0.02  # [m/s]
+"""Highest plausible Stribeck velocity of a bearing."""
 
 
 def stribeck_up_to(flat: Mapping[str, Any]) -> float:
@@ -65,8 +78,8 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
     On a rotary axis it is in rad/s, at a medium radius of bearings.
     """
-    radius = 1.0 if axis_of(flat) == LINEAR else float(np.sqrt(np.prod(settings.bearing_radii)))
-    return settings.highest_stribeck_velocity / radius
+    radius = 1.0 if axis_of(flat) == LINEAR else float(np.sqrt(np.prod(BEARING_RADII)))
+    return HIGHEST_STRIBECK_VELOCITY / radius
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
@@ -108,6 +121,10 @@ def fit_parameters(
     return parameters
 
 
+HIGHEST_FRICTION_RATIO = 4.0
+"""Largest plausible ratio of static to Coulomb friction of a bearing. The thesis's rig has 3."""
+
+
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
@@ -124,7 +141,7 @@ def _friction(
         if both_ways:
             parameters.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         parameters += [
-            FitParameter(RATIO, "", 1.0, 1.0, settings.highest_friction_ratio, logarithmic=False, core=False),
+            FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_FRICTION_RATIO, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, max(speed, stribeck_up_to(flat))),
             _exponent(flat["friction.stribeck_exponent"]),
         ]
@@ -138,12 +155,19 @@ def _friction(
     return parameters
 
 
+EXPONENT_SHARE_OF_A_START = 0.995
+"""Start of a fitted Stribeck exponent, relative to the stated one. Exactly 1 and 2 have simplified equations."""
+
+STRIBECK_EXPONENTS = (0.5, 2.5)
+"""Range of plausible exponents of a Stribeck curve: 0.5 to 2 in Armstrong-Helouvry et al. 1994, with a margin."""
+
+
 def _exponent(stated: float) -> FitParameter:
     """Define the fit parameter for the exponent of the Stribeck curve.
 
     The fit starts slightly below the `stated` value, because 1 and 2 have simplified equations.
     """
-    start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
+    start, (least, most) = EXPONENT_SHARE_OF_A_START * stated, STRIBECK_EXPONENTS
     return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 
 

@@ -17,14 +17,12 @@ from friso.equations.imposed import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.identification.inverse_model import motion, smoothed
+from friso.identification.inverse_model import SMOOTHING_BANDWIDTHS, motion, smoothed
 from friso.identification.logs.checks import runs as stretches
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
-from friso.identification.output_error.settings import settings as output_error_settings
 from friso.identification.readings.common import noise_of, robust
-from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import identification_settings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.stage.controllers import CONTROLLER
 
 CONTINUOUS = "the controller is simulated in continuous time"
@@ -43,6 +41,20 @@ class Simulated:
     position: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
+
+
+FRICTION_SHARE_OF_LINEARITY = 0.01
+"""Largest error of a force sensor's linearity that counts, relative to Coulomb friction. More would hide effects
+of a tenth of the friction."""
+
+RUN_TOLERANCE = 1e-5
+"""Relative tolerance of simulations for a fit. Looser tolerances spoil finite differences."""
+
+DERIVATIVE_STEP = 1e-4
+"""Step of a fitted number for finite differences. Smaller steps drown in the solver's tolerance."""
+
+SAMPLES_OF_OUTPUTS = 16384
+"""Number of samples whose outputs are computed at once, to stay in the processor's caches."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +117,8 @@ class Problem:
             return noise
         omega = 2 * self.flat[KP] / self.flat[KD]
         passes = min(1.0, np.sqrt(2 * NOISE_BANDWIDTH * omega * self.inputs.sample_time))
-        linear = reading_settings.linearity_of_sensors * float(np.std(self.inputs.force[self.counted > 0]))
-        most = output_error_settings.friction_share_of_linearity
+        linear = LINEARITY_OF_SENSORS * float(np.std(self.inputs.force[self.counted > 0]))
+        most = FRICTION_SHARE_OF_LINEARITY
         linear = min([linear, *(most * one.start for one in self.parameters if one.name == "friction.coulomb")])
         return float(np.linalg.norm(np.array([noise * passes, self.shaking[0], linear])))
 
@@ -140,7 +152,7 @@ class Problem:
         """Simulate fitted numbers, (runs, parameters), in chunks; yield run numbers and records."""
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
-        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, output_error_settings.run_tolerance):
+        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, RUN_TOLERANCE):
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
@@ -193,7 +205,7 @@ class Problem:
         """Return the step of number `i` by which derivatives are taken, towards its range's middle."""
         low, high = (end[i] for end in self.bounds)
         share = 1.0 if self.parameters[i].logarithmic else 0.01 * (high - low)
-        size = output_error_settings.derivative_step * share
+        size = DERIVATIVE_STEP * share
         return size if inner[i] < (low + high) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
@@ -236,7 +248,7 @@ class Problem:
         reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
         force = np.empty(runs.states.shape[:2])
-        size = max(1, output_error_settings.samples_of_outputs // len(runs.numbers))
+        size = max(1, SAMPLES_OF_OUTPUTS // len(runs.numbers))
         for first in range(0, count, size):
             part = slice(first, first + size)
             modes = self.kernel.modes(states[..., part], 0.0, reference[..., part], values)
@@ -270,6 +282,10 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
     return Problem(flat, form, inputs, target, tuple(parameters), True, start, counted)
 
 
+SAMPLE_TIME_TOLERANCE = 1e-3
+"""Relative difference below which sample times of log and drive count as equal."""
+
+
 def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     """Return why a sampling drive's controller is simulated in continuous time, "" if it is not.
 
@@ -278,9 +294,16 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     if "drive.sample_time" not in flat:
         return ""
     step = flat["drive.sample_time"]
-    if abs(step / sample_time - 1) >= output_error_settings.sample_time_tolerance:
+    if abs(step / sample_time - 1) >= SAMPLE_TIME_TOLERANCE:
         return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
     return ""
+
+
+SMOOTHING_STEPS = (1, 2, 4, 8)
+"""Cut-off frequencies tried for smoothing the position, relative to the inverse model's cut-off."""
+
+BANDWIDTH_OF_A_MACHINE = 1000.0  # [Hz]
+"""Highest bandwidth of moves of a body that slides. Moves of 20 ms have up to 500 Hz, with the sharpest corners."""
 
 
 def tracking(
@@ -294,15 +317,15 @@ def tracking(
     long enough.
     """
     step = log.sample_time
-    highest = identification_settings.smoothing_bandwidths
-    cutoffs = [highest * times * bandwidth for times in output_error_settings.smoothing_steps]
+    highest = SMOOTHING_BANDWIDTHS
+    cutoffs = [highest * times * bandwidth for times in SMOOTHING_STEPS]
     smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
     # the force is held from each sample to the next
-    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < output_error_settings.sample_time_tolerance
+    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < SAMPLE_TIME_TOLERANCE
     inputs = Inputs(smooth, log["force"][part], step, held)
     counted, omega = moving(log["position"][part], smooth, step, bandwidth)
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
-    if bandwidth > output_error_settings.bandwidth_of_a_machine or not counted.any():
+    if bandwidth > BANDWIDTH_OF_A_MACHINE or not counted.any():
         fast = f"moves of {bandwidth:.3g} Hz" if counted.any() else "rest, as far as the noise of the position shows"
         actual = f"{log.sample_time * len(counted):.3g} s of {fast}"
         expected = "moves of a machine: is the time or the position in another unit, or does the body never slide?"
@@ -333,6 +356,16 @@ def _shaking(log: Log, part: slice, cutoff: float) -> float:
     return float(noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3))
 
 
+TIME_CONSTANTS_OF_SETTLING = 6.0
+"""Number of its time constants after which the guiding controller has forgotten the initial state, to 2 %."""
+
+MOVE_SHARE_OF_SETTLING = 0.5
+"""Longest time of the guiding controller to settle, relative to the longest move. Half of the move remains."""
+
+BANDWIDTH_OF_HOLDING = 10.0  # [Hz]
+"""Highest bandwidth of the controller that drives a stage along a log. A faster one shakes the bristles."""
+
+
 def moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, bandwidth: float) -> tuple[np.ndarray, float]:
     """Return 1 where a position [m], shape (n,), moves and 0 where it rests, and the guiding controller's frequency.
 
@@ -344,12 +377,22 @@ def moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, bandwid
     resting = _resting(position, blur_of(position, smooth), sample_time)
     resting[0] = True
     longest = max((move.stop - move.start for move in stretches(~resting)), default=0) * sample_time
-    constants, most = output_error_settings.time_constants_of_settling, output_error_settings.move_share_of_settling
+    constants, most = TIME_CONSTANTS_OF_SETTLING, MOVE_SHARE_OF_SETTLING
     needed = constants / (2 * np.pi * most * longest) if longest else bandwidth
-    omega = 2 * np.pi * min(max(bandwidth, needed), output_error_settings.bandwidth_of_holding)
+    omega = 2 * np.pi * min(max(bandwidth, needed), BANDWIDTH_OF_HOLDING)
     samples = np.arange(len(position))
     since = samples - np.maximum.accumulate(np.where(resting, samples, 0))
     return np.where(since * sample_time > min(constants / omega, most * longest), 1.0, 0.0), omega
+
+
+DEVIATIONS_OF_A_REST = 20.0
+"""Largest motion of a stage at rest, in standard deviations of the position's noise."""
+
+TIME_OF_A_REST = 0.1  # [s]
+"""Shortest standstill that counts as rest."""
+
+MOTION_SHARE_OF_A_REST = 0.25
+"""Largest motion of a stage at rest, relative to its fastest motion in as long a time."""
 
 
 def _resting(position: np.ndarray, blur: float, sample_time: float) -> np.ndarray:
@@ -357,11 +400,11 @@ def _resting(position: np.ndarray, blur: float, sample_time: float) -> np.ndarra
 
     The time is so long that the fastest motion goes well beyond the blur in it.
     """
-    still = output_error_settings.deviations_of_a_rest * blur
-    window = max(3, round(output_error_settings.time_of_a_rest / sample_time))
+    still = DEVIATIONS_OF_A_REST * blur
+    window = max(3, round(TIME_OF_A_REST / sample_time))
     while True:
         span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-        if still <= output_error_settings.motion_share_of_a_rest * span.max() or 4 * window > len(position):
+        if still <= MOTION_SHARE_OF_A_REST * span.max() or 4 * window > len(position):
             return span <= still
         window *= 2
 
@@ -374,18 +417,29 @@ def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
     return max(robust(position - smooth), noise_of(position))
 
 
+RECORD_SHARE_OF_A_START = 0.05
+"""Largest fraction of a record that is left out at its start (friso's choice)."""
+
+TIME_OF_A_START = 0.1  # [s]
+"""Time at the start of a closed-loop record that the fit leaves out (friso's choice)."""
+
+
 def _after_start(count: int, sample_time: float) -> np.ndarray:
     """Return 0 for the first samples of a closed loop and 1 for all others, shape (count,).
 
     The first samples depend on the initial state of the loop, which a log shows only roughly.
     """
-    most = output_error_settings.record_share_of_a_start * count
-    first = round(min(output_error_settings.time_of_a_start / sample_time, most))
+    most = RECORD_SHARE_OF_A_START * count
+    first = round(min(TIME_OF_A_START / sample_time, most))
     return np.where(np.arange(count) < first, 0.0, 1.0)
+
+
+SAMPLES_OF_FIRST_VELOCITY = 10
+"""Number of samples from which the initial velocity is computed."""
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
     """Return initial position [m] and velocity [m/s], by a parabola through the first samples."""
-    count = output_error_settings.samples_of_first_velocity
+    count = SAMPLES_OF_FIRST_VELOCITY
     slope = np.polyfit(np.arange(count) * log.sample_time, log["position"][part][:count], 2)[1]
     return float(log["position"][part.start]), float(slope)

@@ -10,12 +10,15 @@ from friso.identification.estimate import Estimate
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import Coverage, IdentifiableFit, Profile, why_not_shown
 from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, FitParameter, keys_at
-from friso.identification.output_error.settings import settings
-from friso.identification.output_error.settings import settings as output_error_settings
-from friso.identification.readings.settings import settings as reading_settings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.intervals import NORMAL_COVERAGE
 
 METHOD = "output error"
+
+
+STATIC_ERROR_OF_FOLLOWING = 0.05
+"""Relative error by which static friction is too high where a stage follows a log, 3 to 6 %
+(docs/evidence/identify.md)."""
 
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
@@ -33,9 +36,9 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
-    shares = np.full(len(keys), reading_settings.linearity_of_sensors)
+    shares = np.full(len(keys), LINEARITY_OF_SENSORS)
     if "friction.static" in keys and not fit.problem.closed:
-        shares[keys.index("friction.static")] = output_error_settings.static_error_of_following
+        shares[keys.index("friction.static")] = STATIC_ERROR_OF_FOLLOWING
     linear = shares * np.abs([values[key] for key in keys]) / NORMAL_COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
@@ -134,6 +137,11 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
     return list(at), np.array([[(keys[key] - at[key]) / step for keys in moved] for key in at])
 
 
+COULOMB_FRICTION_OF_ONE_WAY = (0.18, 2.2)
+"""Range left to Coulomb friction, in shares of its sum with a constant force. A cable or a tilt helps a motion by
+half of the friction, or opposes it by four times as much."""
+
+
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     """Return the range [SI] that is left to a parameter that the record does not determine.
 
@@ -146,7 +154,7 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter, number_of = parameters[owner], {name: number for number, name in enumerate(parameters)}
     if owner == "friction.coulomb" and _one_way(parameters):
-        low, high = settings.coulomb_friction_of_one_way
+        low, high = COULOMB_FRICTION_OF_ONE_WAY
         return low * fit.value(owner), high * fit.value(owner)
     of_coulomb = owner in (RATIO, *BRISTLES) and number_of["friction.coulomb"] not in fit.bounded
     if parameter.core or of_coulomb:
@@ -165,6 +173,13 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     return parameter.low, parameter.high
 
 
+SEED_OF_DRAWS = 5
+"""Random seed of the drawn machines, which makes results repeatable."""
+
+MACHINES_DRAWN = 16
+"""Number of machines drawn from the ranges that a record leaves open; they fill the solver's lanes twice."""
+
+
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
@@ -175,12 +190,10 @@ def drawn_from(
     `correlation`. Quantities with a range only are uniform in it, or in its logarithm; a parameter without an estimate
     is sampled from its whole range of the fit.
     """
-    rng = np.random.default_rng(settings.seed_of_draws)
+    rng = np.random.default_rng(SEED_OF_DRAWS)
     determined = [estimate for estimate in estimates if estimate.determined]
     sizes, ways = np.linalg.eigh(correlation)
-    steps = (
-        rng.standard_normal((settings.machines_drawn, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
-    )
+    steps = rng.standard_normal((MACHINES_DRAWN, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
     values = {
         estimate.name: np.clip(
             estimate.value + step * estimate.half_width / NORMAL_COVERAGE, estimate.low, estimate.high
@@ -191,7 +204,7 @@ def drawn_from(
         if not estimate.determined and np.isfinite([estimate.low, estimate.high]).all():
             range_left = FitParameter(estimate.name, "", np.nan, estimate.low, estimate.high, estimate.low > 0)
             values[estimate.name] = _evenly(range_left, rng)
-    rows = np.tile(inner, (settings.machines_drawn, 1))
+    rows = np.tile(inner, (MACHINES_DRAWN, 1))
     for number, parameter in enumerate(parameters):
         drawn = _of_parameter(parameter.name, values)
         drawn = _evenly(parameter, rng) if drawn is None else np.clip(drawn, parameter.low, parameter.high)
@@ -205,7 +218,7 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
     The values are in SI units, and even in the logarithm for a logarithmic parameter.
     """
     ends = parameter.inner(parameter.low), parameter.inner(parameter.high)
-    return parameter.outer(rng.uniform(*ends, settings.machines_drawn))
+    return parameter.outer(rng.uniform(*ends, MACHINES_DRAWN))
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:

@@ -16,7 +16,6 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
-from friso.identification.readings.settings import settings
 from friso.stage.tables import moving_mass
 
 HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
@@ -130,6 +129,10 @@ class BearingRecord:
         return BearingRecord(self.time[::step], (place - place[0])[::step], bent, force[::step])
 
 
+PERIODS_OF_AN_EDGE = 2.0
+"""Length of the stretch at each end of a record that the low-pass distorts, in periods of its cut-off."""
+
+
 @dataclass(frozen=True)
 class LowPass:
     """A low-pass at a `cutoff` [Hz] over time [s], shape (n,)."""
@@ -140,7 +143,7 @@ class LowPass:
     @property
     def inside(self) -> slice:
         """Return the samples that the filter's transients at the ends do not affect."""
-        edge = int(settings.periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
+        edge = int(PERIODS_OF_AN_EDGE / (self.cutoff * (self.time[1] - self.time[0])))
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
@@ -158,6 +161,19 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
     return BearingRecord(log.time[part], position, bent, force)
 
 
+SAMPLED_FREQUENCY = 0.2
+"""Highest frequency of motion that a spline follows, relative to the sampling frequency."""
+
+PERIODS_OF_A_RECORD = 20
+"""Shortest record, in periods of the low-pass."""
+
+ROUNDING_OF_A_POSITION = 1e-9
+"""Largest motion that counts as rounding error, relative to the largest position."""
+
+DEVIATIONS_OF_SEEN_MOTION = 10.0
+"""Smallest visible motion, in standard deviations of the noise."""
+
+
 def why_unseen(record: BearingRecord, fewest: int) -> str:
     """Return why a record cannot be used, such as too few samples or no force; "" if it can.
 
@@ -168,15 +184,15 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
     if not np.ptp(record.force) > 0:
         return "the force does not change"
     highest = motion_bandwidth(record.body, record.interval)
-    if highest * record.interval > settings.sampled_frequency:
-        needed = settings.sampled_frequency / highest
+    if highest * record.interval > SAMPLED_FREQUENCY:
+        needed = SAMPLED_FREQUENCY / highest
         sampled = f"one sample in {record.interval:.3g} s"
         return f"{sampled}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
-    cutoff = max(highest, settings.periods_of_a_record / (len(record.time) * record.interval))
+    cutoff = max(highest, PERIODS_OF_A_RECORD / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
-    rounding = settings.rounding_of_a_position * float(np.abs(record.position).max())
-    if not motion > max(settings.deviations_of_seen_motion * noise, rounding):
+    rounding = ROUNDING_OF_A_POSITION * float(np.abs(record.position).max())
+    if not motion > max(DEVIATIONS_OF_SEEN_MOTION * noise, rounding):
         return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
     return ""
 
@@ -188,8 +204,8 @@ def cutoff_of(record: BearingRecord) -> float:
     into the record.
     """
     highest = motion_bandwidth(record.body, record.interval)
-    lowest = settings.periods_of_a_record / (len(record.time) * record.interval)
-    return max(min(highest, settings.sampled_frequency / (2 * record.interval)), lowest)
+    lowest = PERIODS_OF_A_RECORD / (len(record.time) * record.interval)
+    return max(min(highest, SAMPLED_FREQUENCY / (2 * record.interval)), lowest)
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -212,6 +228,16 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
     return CubicSpline(time, signal)(time, 1)
 
 
+DEFLECTION_SHARE_OF_BENDING = 0.02
+"""Smallest deflection of a joint that bends, relative to the motion."""
+
+CONTACT_RATIO_OF_BENDING = 3.0
+"""Smallest deflection of a joint that bends, relative to the deflection of the contact that holds it."""
+
+DEVIATIONS_OF_BENDING = 3.0
+"""Smallest deflection of a joint that bends, in standard deviations of the sensor's noise."""
+
+
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """Return the measured deflection [m] of a joint that bends.
 
@@ -219,14 +245,14 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
     the motion, or what the contact of a held joint `gives` [m].
     """
     measured = deflection(log)
-    if measured is None or len(position) < settings.periods_of_a_record:
+    if measured is None or len(position) < PERIODS_OF_A_RECORD:
         return None
-    bent, cutoff = measured[part], settings.sampled_frequency / log.sample_time / 4
+    bent, cutoff = measured[part], SAMPLED_FREQUENCY / log.sample_time / 4
     size = low_pass(bent, log.sample_time, cutoff).std()
     noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
     noise *= robust(np.diff(bent, 2)) / 6**0.5
-    of_motion, of_contact = settings.deflection_share_of_bending, settings.contact_ratio_of_bending
-    least = max(settings.deviations_of_bending * noise, of_motion * position.std(), of_contact * gives)
+    of_motion, of_contact = DEFLECTION_SHARE_OF_BENDING, CONTACT_RATIO_OF_BENDING
+    least = max(DEVIATIONS_OF_BENDING * noise, of_motion * position.std(), of_contact * gives)
     return bent if size > least else None
 
 
@@ -240,9 +266,13 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
     return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
 
 
+POINTS_PER_SAMPLE = 8
+"""Points per sample when a structural mode is simulated. A mode at a tenth of the sampling rate errs by 0.05 %."""
+
+
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Compute the acceleration [m/s^2] of a mode's mass from the acceleration of its base."""
-    omega, points = 2 * np.pi * mode.frequency, settings.points_per_sample
+    omega, points = 2 * np.pi * mode.frequency, POINTS_PER_SAMPLE
     step = float(time[1] - time[0]) / points
     fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * points + 1))
     damping = 2 * mode.damping_ratio * omega

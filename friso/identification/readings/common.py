@@ -15,7 +15,6 @@ from scipy.stats import t as student
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
-from friso.identification.readings.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 
 FILTER_ORDER = 2
@@ -129,17 +128,33 @@ def by_segment(
     return np.concatenate([treated(values[part], log.sample_time, cutoff) for part in log.segments])
 
 
+BLOCKS_OF_A_MEAN = 8
+"""Blocks of a stretch for its mean. Each must be long enough to forget the previous one."""
+
+LINES_OF_A_SPECTRUM = 1000
+"""Lines of the spectrum. More resolve more and scatter more."""
+
+SPECTRUM_SHARE_OF_NOISE = 0.25
+"""Upper part of the spectrum that is taken for noise."""
+
+POWER_OF_CLEAR_MOTION = 100.0
+"""Smallest power of visible motion, relative to the noise. Less occurs by chance among many spectral lines."""
+
+POWER_OF_STRONG_MOTION = 1e-3
+"""Smallest spectral power of visible motion, relative to the acceleration's largest."""
+
+
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
     """Return the highest frequency [Hz] at which a position, (n,), stands out of its noise.
 
     The noise is taken to be white. Returns 0 if the position stands out nowhere.
     """
-    pieces = min(len(position) // settings.blocks_of_a_mean, 2 * settings.lines_of_a_spectrum)
+    pieces = min(len(position) // BLOCKS_OF_A_MEAN, 2 * LINES_OF_A_SPECTRUM)
     rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=pieces)
     white = np.sin(np.pi * rates * sample_time) ** 4
-    top = slice(-int(np.ceil(settings.spectrum_share_of_noise * len(rates))), None)
+    top = slice(-int(np.ceil(SPECTRUM_SHARE_OF_NOISE * len(rates))), None)
     noise = white * float(np.median(density[top] / white[top]))
-    least = np.maximum(settings.power_of_clear_motion * noise, settings.power_of_strong_motion * density.max())
+    least = np.maximum(POWER_OF_CLEAR_MOTION * noise, POWER_OF_STRONG_MOTION * density.max())
     return float(rates[density > least].max(initial=0.0))
 
 
@@ -171,6 +186,24 @@ def _median(sizes: np.ndarray, digit: float) -> float:
     return low + float((0.5 - below) / within) * (middle + digit / 2 - low) if within > 0 else middle
 
 
+ROUNDING_OF_A_SIGNAL = 1e-12
+"""Largest step that is rounding of numbers rather than the signal's resolution, relative to the signal."""
+
+LEVELS_OF_A_DIGIT = 8
+"""Fewest distinct levels at which a signal must stay for its resolution to show."""
+
+ERROR_OF_A_DIGIT = 0.1
+"""Largest distance of levels from multiples of the resolution, relative to it."""
+
+SHARE_OF_COMMANDED_CHANGES = 0.03
+"""Largest fraction of samples at which a stepped command changes. A rounded signal that is logged ten times as
+often as it changes has more."""
+
+DIGITS_OF_A_COMMANDED_STEP = 1.5
+"""Smallest usual jump of a stepped command, in common steps of its levels. A rounded signal that changes seldom is
+slow, and changes by one step."""
+
+
 def digit_of(signal: np.ndarray) -> float:
     """Return the resolution of a signal, shape (n,); 0 if it has none.
 
@@ -179,16 +212,16 @@ def digit_of(signal: np.ndarray) -> float:
     several common steps.
     """
     steps = np.abs(np.diff(signal))
-    dust = settings.rounding_of_a_signal * np.abs(signal).max(initial=0.0)
+    dust = ROUNDING_OF_A_SIGNAL * np.abs(signal).max(initial=0.0)
     changes = steps > dust
     real, stays = steps[changes], np.sort(signal[1:][~changes])
     apart = np.diff(stays)
     apart = apart[apart > dust]
-    if apart.size >= settings.levels_of_a_digit:
+    if apart.size >= LEVELS_OF_A_DIGIT:
         digits = apart / apart.min()
-        if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
-            few = real.size < settings.share_of_commanded_changes * steps.size
-            stepped = few and np.median(real) > settings.digits_of_a_commanded_step * apart.min()
+        if np.abs(digits - np.round(digits)).max() <= ERROR_OF_A_DIGIT:
+            few = real.size < SHARE_OF_COMMANDED_CHANGES * steps.size
+            stepped = few and np.median(real) > DIGITS_OF_A_COMMANDED_STEP * apart.min()
             return 0.0 if stepped else float(apart.min())
     elif stays.size > steps.size / 2:
         return 0.0
@@ -229,7 +262,7 @@ def block_mean(values: np.ndarray) -> Mean:
 
     Neighbouring samples are not independent.
     """
-    count = min(settings.blocks_of_a_mean, len(values))
+    count = min(BLOCKS_OF_A_MEAN, len(values))
     means = np.array([part.mean() for part in np.array_split(values, count)])
     error = float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
     return Mean(float(values.mean()), error, count - 1)
@@ -243,7 +276,7 @@ def correlated_mean(values: np.ndarray) -> Mean:
     count = len(values)
     off = values - values.mean()
     power = float(off @ off)
-    enough = power > 0 and count >= settings.blocks_of_a_mean
+    enough = power > 0 and count >= BLOCKS_OF_A_MEAN
     share = min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9) if enough else 0.0
     independent = max(count * (1 - share) / (1 + share), 2.0)
     error = float(values.std(ddof=1) / np.sqrt(independent))
@@ -280,7 +313,7 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     The target, shape (n,), is fitted by columns, shape (n, p).
     """
-    blocks = settings.blocks_of_a_mean
+    blocks = BLOCKS_OF_A_MEAN
     parts = zip(np.array_split(columns, blocks), np.array_split(target, blocks), strict=True)
     square, product = columns.T @ columns, columns.T @ target
     without = np.array([solve_normal_equations(square - x.T @ x, product - x.T @ y) for x, y in parts])

@@ -12,11 +12,9 @@ from friso.errors import InputError
 from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import bends
-from friso.identification.readings.friction_velocity import distinct
+from friso.identification.readings.friction_velocity import SPEEDS_OF_A_LINE, distinct
 from friso.identification.readings.motion_events import Pass, force_ramps, passes
-from friso.identification.readings.settings import settings
 from friso.identification.response.records import find_periods
-from friso.identification.settings import experiment_settings
 
 
 @dataclass(frozen=True)
@@ -31,6 +29,37 @@ class Repetition:
     harmonics: float
     turns: int
     rests: float
+
+
+FEWEST_RAMPS = 3
+"""Fewest ramps that determine static friction, or contradict a fit."""
+
+VARIANCE_SHARE_OF_BRISTLES = 0.25
+"""Smallest fraction of the force's variance that the position must explain before a fit of bristles is tried."""
+
+SAMPLES_OF_A_BLUR = 20
+"""Number of samples over which a position is averaged, against noise, before its travel is summed."""
+
+SHARE_OF_MOST_OF_A_WAY = 0.75
+"""Fraction of the way that counts as most of the way. Moves cover a sixth to a half at constant speed."""
+
+LOG_SHARE_OF_RAMPS = 0.25
+"""Smallest fraction of a log that force ramps must take together. The starts of moves take a few per cent."""
+
+FORCE_SHARE_OFF_A_LINE = 0.1
+"""Largest deviation of a ramp from a line, relative to its break-away force."""
+
+FORCE_SHARE_BEFORE_A_RAMP = 0.05
+"""Largest force before a ramp, relative to the ramp's. An integrator passes zero without a rest."""
+
+LOG_SHARE_OF_A_REST = 0.01
+"""Shortest rest of a position, relative to the log."""
+
+RESTS_OF_MOVES = 0.1
+"""Fraction of time at rest above which a repeating log consists of moves."""
+
+HARMONICS_OF_AN_EXCITATION = 7.0
+"""Effective number of harmonics above which a log is a broad-band excitation. Moves have 1 to 7."""
 
 
 @dataclass(frozen=True)
@@ -71,15 +100,15 @@ class Course:
         """
         if self.reference_moves:
             return "its reference moves"
-        if distinct(self.speeds) >= settings.speeds_of_a_line or self.ramps >= settings.fewest_ramps:
+        if distinct(self.speeds) >= SPEEDS_OF_A_LINE or self.ramps >= FEWEST_RAMPS:
             return None
         repetition = self.repetition
         if repetition is None:
             standing = "reference" in self.log
             return None if standing else f"the {self.signal} does not repeat, and there is no reference that moves"
-        if repetition.rests > experiment_settings.rests_of_moves:
+        if repetition.rests > RESTS_OF_MOVES:
             return f"{self.repeats}, but the position rests in between"
-        if repetition.harmonics < experiment_settings.harmonics_of_an_excitation:
+        if repetition.harmonics < HARMONICS_OF_AN_EXCITATION:
             return f"{self.repeats}, but contains few frequencies"
         return None
 
@@ -93,7 +122,7 @@ class Course:
         position, force = self.log["position"][part], self.log["force"][part]
         if not (0 < np.ptp(position) < 2 * bends(self.log.axis)[1] and np.ptp(force) > 0):
             return False
-        least = settings.variance_share_of_bristles
+        least = VARIANCE_SHARE_OF_BRISTLES
         return float(np.corrcoef(position, force)[0, 1]) > np.sqrt(least)
 
     @cached_property
@@ -108,9 +137,9 @@ class Course:
         except InputError:
             return np.zeros(0)
         steady = [stretch for stretch in stretches if stretch.steady and self._slides(stretch)]
-        way = float(np.abs(np.diff(uniform_filter1d(position[part], settings.samples_of_a_blur))).sum())
+        way = float(np.abs(np.diff(uniform_filter1d(position[part], SAMPLES_OF_A_BLUR))).sum())
         gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
-        return np.array([abs(stretch.velocity) for stretch in steady if gone > settings.share_of_most_of_a_way * way])
+        return np.array([abs(stretch.velocity) for stretch in steady if gone > SHARE_OF_MOST_OF_A_WAY * way])
 
     @cached_property
     def ramps(self) -> int:
@@ -127,7 +156,7 @@ class Course:
             return 0
         rows = zip(shown.times, shown.directions * shown.forces, shown.forces / shown.rates, strict=True)
         even = [lasts for at, force, lasts in rows if self._from_none(at, force, lasts)]
-        return len(even) if sum(even) > settings.log_share_of_ramps * len(log.time) * log.sample_time else 0
+        return len(even) if sum(even) > LOG_SHARE_OF_RAMPS * len(log.time) * log.sample_time else 0
 
     def _from_none(self, at: float, force: float, lasts: float) -> bool:
         """Tell whether the force rests at zero and then rises evenly until the time `at` [s].
@@ -141,14 +170,14 @@ class Course:
             values = self.log["force"][edges[0] : edges[1]]
             return float(values.mean()) / force if values.size else 0.0
 
-        on_line = abs(mean(0.2, 0.3) - 0.25) < settings.force_share_off_a_line
-        return on_line and abs(mean(-0.2, -0.1)) < settings.force_share_before_a_ramp
+        on_line = abs(mean(0.2, 0.3) - 0.25) < FORCE_SHARE_OFF_A_LINE
+        return on_line and abs(mean(-0.2, -0.1)) < FORCE_SHARE_BEFORE_A_RAMP
 
     @property
     def one_way(self) -> bool:
         """Tell whether most of the way goes in one direction, with or without stops."""
-        position = uniform_filter1d(self.log["position"][self.log.longest], settings.samples_of_a_blur)
-        return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
+        position = uniform_filter1d(self.log["position"][self.log.longest], SAMPLES_OF_A_BLUR)
+        return bool(np.ptp(position) > SHARE_OF_MOST_OF_A_WAY * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
         """Tell whether a body slides in a stretch: the force changes there by less than its mean.
@@ -164,7 +193,7 @@ class Course:
         """Tell whether the position rests at several places, with a force that rises with it."""
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
-        size = max(int(settings.log_share_of_a_rest * len(position)), 2)
+        size = max(int(LOG_SHARE_OF_A_REST * len(position)), 2)
         rests = [rest for rest in runs(_still(position, size)) if rest.stop - rest.start > size]
         later = [slice((rest.start + rest.stop) // 2, rest.stop) for rest in rests]
         places, forces = (np.array([values[rest].mean() for rest in later]) for values in (position, force))
@@ -194,21 +223,37 @@ class Course:
         return f"a log in which {self.repeats}, {between}"
 
 
+PLACES_OF_A_SPRING = 4
+"""Fewest rest positions that show a spring."""
+
+TRAVEL_SHARE_OF_A_REST = 0.01
+"""Largest motion of a position at rest, relative to the travel."""
+
+RETURNS_TO_A_PLACE = 2
+"""Fewest places reached from both sides that show a spring."""
+
+HYSTERESIS_OF_A_SPRING = 0.05
+"""Largest difference of a spring's force between both sides, relative to its range. Friction differs by more."""
+
+VARIANCE_SHARE_OF_A_SPRING = 0.99
+"""Smallest fraction of the force's variance between rests that position must explain for a spring to act."""
+
+
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
     """Tell whether forces at successive rest positions, shape (n,), rise as a spring's do."""
-    if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
+    if len(places) < PLACES_OF_A_SPRING or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
     order = np.argsort(places)
-    near = 2 * settings.travel_share_of_a_rest * np.ptp(places)
+    near = 2 * TRAVEL_SHARE_OF_A_REST * np.ptp(places)
     alike = np.split(order, np.flatnonzero(np.diff(places[order]) > near) + 1)
     upward = np.diff(places, prepend=np.nan)
     sides = [(forces[here[upward[here] > 0]], forces[here[upward[here] < 0]]) for here in alike]
     apart = [abs(float(np.median(up) - np.median(down))) for up, down in sides if len(up) and len(down)]
-    if len(alike) < settings.places_of_a_spring or len(apart) < settings.returns_to_a_place:
+    if len(alike) < PLACES_OF_A_SPRING or len(apart) < RETURNS_TO_A_PLACE:
         return False
-    if max(apart) > settings.hysteresis_of_a_spring * np.ptp(forces):
+    if max(apart) > HYSTERESIS_OF_A_SPRING * np.ptp(forces):
         return False
-    return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(settings.variance_share_of_a_spring)
+    return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(VARIANCE_SHARE_OF_A_SPRING)
 
 
 def external(log: Log) -> str | None:
@@ -238,12 +283,16 @@ def _rest(position: np.ndarray, samples: int) -> float:
 def _still(position: np.ndarray, size: int) -> np.ndarray:
     """Tell at which samples, (n,), a position [m] hardly moves, within windows of a `size`."""
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
-    return moved < settings.travel_share_of_a_rest * np.ptp(position)
+    return moved < TRAVEL_SHARE_OF_A_REST * np.ptp(position)
+
+
+RANGE_SHARE_OF_A_TURN = 0.1
+"""Smallest reversal of a signal that counts as a turn, relative to its range."""
 
 
 def _turns(period: np.ndarray) -> int:
     """Count how often a signal turns back within one period by a fraction of its range."""
-    least, turns, direction, last = settings.range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
+    least, turns, direction, last = RANGE_SHARE_OF_A_TURN * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:
             last = value

@@ -16,8 +16,7 @@ from scipy.signal import lfilter, periodogram
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identification.readings.motion_events import Pass, passes
-from friso.identification.readings.settings import settings
+from friso.identification.readings.motion_events import LOW_PASS_OF_PASSES, Pass, passes
 from friso.intervals import NORMAL_COVERAGE
 
 
@@ -51,6 +50,10 @@ class PassMap:
     steady: bool
 
 
+CORRELATION_OF_PASSES = 0.5
+"""Correlation of the maps of two passes from which they repeat each other."""
+
+
 @dataclass(frozen=True)
 class FrictionPosition:
     """Friction along the rail in several passes.
@@ -70,7 +73,11 @@ class FrictionPosition:
     @property
     def repeats(self) -> bool:
         """Tell whether passes over the same places repeat the force, which then depends on the place."""
-        return self.repeatability.determined and self.repeatability.value >= settings.correlation_of_passes
+        return self.repeatability.determined and self.repeatability.value >= CORRELATION_OF_PASSES
+
+
+POINTS_OF_A_FRICTION_MAP = 400
+"""Number of places of a friction map over the whole travel."""
 
 
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
@@ -88,7 +95,7 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     travel = [np.ptp(position[p.span]) for p in stretches]
     long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
-    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), settings.points_of_a_friction_map)
+    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS_OF_A_FRICTION_MAP)
     maps = tuple(_map(stretch, places, position, force, log.sample_time, mass) for stretch in long)
     pairs = _pairs(maps)
     repeatability = _repeatability(maps, pairs)
@@ -111,7 +118,7 @@ def _map(
     A place may be passed several times where the motion goes back a little; places without samples are interpolated.
     """
     x, f = position[stretch.span], force[stretch.span]
-    smooth = low_pass(x, sample_time, settings.low_pass_of_passes)
+    smooth = low_pass(x, sample_time, LOW_PASS_OF_PASSES)
     f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
     step = places[1] - places[0]
     bins = np.clip(np.round((x - places[0]) / step).astype(int), 0, len(places) - 1)
@@ -149,6 +156,13 @@ def _length(fields: np.ndarray) -> np.ndarray:
     return np.where(below.any(axis=1), at - 1 + (before - np.exp(-1)) / (before - after), np.nan)
 
 
+CORRELATION_LENGTHS_OF_A_PASS = 5.0
+"""Shortest pass that shows a correlation length, in correlation lengths."""
+
+FIELDS_DRAWN = 300
+"""Number of random fields drawn for the interval of the correlation length. Fewer leave its ends to chance."""
+
+
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Estimate the correlation length [m] of the force along the rail.
 
@@ -161,17 +175,21 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
         return Estimate.unknown(name, unit, method, "the force does not vary along the rail")
     length = float(_length(flat[None])[0])
     count = len(flat)
-    if not length * settings.correlation_lengths_of_a_pass <= count:
-        reason = f"the pass holds fewer than {settings.correlation_lengths_of_a_pass:g} correlation lengths"
-        return Estimate.unknown(name, unit, method, reason, low=count / settings.correlation_lengths_of_a_pass * step)
+    if not length * CORRELATION_LENGTHS_OF_A_PASS <= count:
+        reason = f"the pass holds fewer than {CORRELATION_LENGTHS_OF_A_PASS:g} correlation lengths"
+        return Estimate.unknown(name, unit, method, reason, low=count / CORRELATION_LENGTHS_OF_A_PASS * step)
     share = np.exp(-1 / max(length, 0.5))
-    noise = np.random.default_rng(0).standard_normal((settings.fields_drawn, count + int(5 * length) + 1))
+    noise = np.random.default_rng(0).standard_normal((FIELDS_DRAWN, count + int(5 * length) + 1))
     fields = np.asarray(lfilter([1.0], [1.0, -share], noise, axis=1))[:, -count:]
     trend = np.stack([np.ones(count), np.linspace(-1, 1, count)])
     fields -= fields @ np.linalg.pinv(trend) @ trend
     low, middle, high = np.nanpercentile(_length(fields) / max(length, 0.5), [2.5, 50, 97.5])
     value, least, most = (float(length / ratio * step) for ratio in (middle, high, low))
     return Estimate(name, unit, value, least, most, method)
+
+
+HARMONICS_OF_A_PASS = 3
+"""Number of harmonics reported for each pass."""
 
 
 def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, ...]:
@@ -181,7 +199,7 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
     """
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
-    best = inner[np.argsort(power[inner])[::-1][: settings.harmonics_of_a_pass]]
+    best = inner[np.argsort(power[inner])[::-1][:HARMONICS_OF_A_PASS]]
     return tuple(Harmonic(float(1 / rates[i]), float((2 * power[i]) ** 0.5), float(speed * rates[i])) for i in best)
 
 
@@ -257,7 +275,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
-    elif repeatability.value < settings.correlation_of_passes:
+    elif repeatability.value < CORRELATION_OF_PASSES:
         reasons.append(f"repeated passes over the same places differ ({correlation})")
     quick = [m for m in maps if crossover and any(h.frequency > crossover for h in m.harmonics[:1])]
     if quick:

@@ -23,11 +23,9 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model, unit_of
 from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
-from friso.identification.output_error.settings import settings as output_error_settings
+from friso.identification.output_error.parameters import STRIBECK_EXPONENTS
 from friso.identification.readings.common import Mean, by_direction, by_t, channel, t_value
 from friso.identification.readings.motion_events import Pass, on_common_places, passes, places_of
-from friso.identification.readings.settings import settings
-from friso.identification.readings.settings import settings as reading_settings
 from friso.intervals import NORMAL_COVERAGE
 
 
@@ -79,6 +77,25 @@ class Forces:
     both: bool
 
 
+RATIO_BELOW_THE_SLOWEST = 30.0
+"""Ratio by which a Stribeck velocity may lie below the slowest speed."""
+
+RATIO_ABOVE_THE_FASTEST = 2.0
+"""Ratio by which a Stribeck velocity may lie above the fastest speed."""
+
+GRID_OF_VELOCITIES = 81
+"""Number of Stribeck velocities in the grid. Fewer miss the valley of the cost."""
+
+GRID_OF_EXPONENTS = 41
+"""Number of Stribeck exponents in the grid."""
+
+CHANCE_OF_A_CURVE = 0.01
+"""Probability below which a Stribeck curve is significant, or an exponent is refuted."""
+
+USUAL_EXPONENT = 2.0
+"""Stribeck exponent assumed for few forces, which cannot determine one more parameter."""
+
+
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
     """Fit a Stribeck curve to forces; return None if a straight line fits as well.
 
@@ -86,11 +103,11 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     forces leave all exponents possible.
     """
     speeds = forces.speeds
-    low = speeds.min() / reading_settings.ratio_below_the_slowest
-    high = speeds.max() * reading_settings.ratio_above_the_fastest
-    velocities = np.geomspace(low, high, reading_settings.grid_of_velocities)
-    least, most = output_error_settings.stribeck_exponents
-    shapes = np.linspace(least, most, reading_settings.grid_of_exponents)
+    low = speeds.min() / RATIO_BELOW_THE_SLOWEST
+    high = speeds.max() * RATIO_ABOVE_THE_FASTEST
+    velocities = np.geomspace(low, high, GRID_OF_VELOCITIES)
+    least, most = STRIBECK_EXPONENTS
+    shapes = np.linspace(least, most, GRID_OF_EXPONENTS)
     left = len(speeds) - 5 - forces.both
     apart = left < 1
     left += apart
@@ -101,13 +118,13 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     if exponent is not None:
         stated = _Grid(forces, velocities, np.array([exponent]), False).around(left + (not apart))
         worse = (stated.least - grid.least) / max(grid.least / left, 1.0)
-        refuted = not apart and bool(fisher.sf(worse, 1, left) < reading_settings.chance_of_a_curve)
+        refuted = not apart and bool(fisher.sf(worse, 1, left) < CHANCE_OF_A_CURVE)
         if not refuted:
             grid, left = stated, left + (not apart)
     free = len(grid.shapes) > 1 and not apart
     usual = grid
     if free:
-        usual = _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
+        usual = _Grid(forces, velocities, np.array([USUAL_EXPONENT]), False).around(left + free)
     if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
         return None
     return grid.curve(left, refuted, (velocities[0], velocities[-1]))
@@ -122,7 +139,14 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
     if not 0 < least < plain:
         return least < plain
     chance = fisher.sf((plain - least) / more * left / least, more, left)
-    return bool(chance < reading_settings.chance_of_a_curve)
+    return bool(chance < CHANCE_OF_A_CURVE)
+
+
+REFINEMENTS_OF_THE_GRID = 2
+"""Number of refinements of the grid around the possible region."""
+
+MARGIN_OF_THE_GRID = 2
+"""Number of grid steps that a refined grid reaches beyond the possible region."""
 
 
 class _Grid:
@@ -161,13 +185,13 @@ class _Grid:
         The new grid lies within this one. If no curve is possible, this grid is returned.
         """
         grid = self
-        for _ in range(reading_settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
-            inside, ends, margin = grid.room(left) >= 0, [], reading_settings.margin_of_the_grid
+        for _ in range(REFINEMENTS_OF_THE_GRID if np.isfinite(self.least) and left > 0 else 0):
+            inside, ends, margin = grid.room(left) >= 0, [], MARGIN_OF_THE_GRID
             for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
                 at = np.flatnonzero(here)
                 ends += [points[max(at[0] - margin, 0)], points[min(at[-1] + margin, len(points) - 1)]]
-            several = np.linspace(ends[2], ends[3], reading_settings.grid_of_exponents)
-            velocities = np.geomspace(ends[0], ends[1], reading_settings.grid_of_velocities)
+            several = np.linspace(ends[2], ends[3], GRID_OF_EXPONENTS)
+            velocities = np.geomspace(ends[0], ends[1], GRID_OF_VELOCITIES)
             grid = _Grid(grid.forces, velocities, several if len(grid.shapes) > 1 else grid.shapes, grid.apart)
         return grid
 
@@ -194,7 +218,7 @@ class _Grid:
         inside = room >= 0
         fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
         ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
-        cut = any(float(self.shapes[shaped][end]) == output_error_settings.stribeck_exponents[end] for end in (0, -1))
+        cut = any(float(self.shapes[shaped][end]) == STRIBECK_EXPONENTS[end] for end in (0, -1))
 
         def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
             centre = self.solutions[..., place][inside] * scale
@@ -298,6 +322,10 @@ class FrictionVelocity:
     warnings: tuple[str, ...]
 
 
+LINEARITY_OF_SENSORS = 1e-3
+"""Relative error of the ratio of two channels, the linearity of good sensors and amplifiers."""
+
+
 def friction_velocity(log: Log, mass: float | None = None, exponent: float | None = None) -> FrictionVelocity:
     """Read friction over speed from stretches of constant velocity, over their common places.
 
@@ -313,7 +341,7 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     velocities, forces, errors, swings = np.array([_row(stretch, moved, off) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     if used:
-        linear = np.full_like(size, settings.linearity_of_sensors * size.max())
+        linear = np.full_like(size, LINEARITY_OF_SENSORS * size.max())
         errors = np.linalg.norm([errors, linear, swings**2 * np.ptp(size)], axis=0)
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
@@ -357,6 +385,10 @@ def _row(stretch: Pass, mass: float, error: float) -> tuple[float, float, float,
     return velocity, force.value - mass * stretch.acceleration, half, stretch.swing / abs(velocity)
 
 
+SPAN_OF_SPEEDS = 1.5
+"""Ratio of speeds from which Coulomb and viscous friction can be separated."""
+
+
 def _together(
     velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
 ) -> tuple[Estimate, Direction, bool]:
@@ -372,7 +404,7 @@ def _together(
         reason = "fewer than two steady stretches in one of the directions"
         return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
     columns = [sign, np.ones_like(sign)]
-    if np.abs(velocities).max() >= settings.span_of_speeds * np.abs(velocities).min():
+    if np.abs(velocities).max() >= SPAN_OF_SPEEDS * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
     even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # curvature cancels between forward and backward motion
@@ -445,6 +477,13 @@ def _nothing(reason: str) -> Direction:
     return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
 
 
+SPEEDS_OF_A_LINE = 3
+"""Fewest distinct speeds that show a deviation from a straight line."""
+
+SPEEDS_OF_A_CURVE = 5
+"""Fewest distinct speeds to which a curve with four parameters is fitted."""
+
+
 def _direction(
     velocities: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, exponent: float | None, spent: int = 0
 ) -> Direction:
@@ -458,7 +497,7 @@ def _direction(
     if len(speeds) < 3 + spent:
         return _nothing(f"{len(speeds)} steady stretches {words}: {3 + spent} are needed")
     slowest = f"no steady motion below {speeds.min() * 1e3:.3g} mm/s"
-    if speeds.max() < settings.span_of_speeds * speeds.min():
+    if speeds.max() < SPAN_OF_SPEEDS * speeds.min():
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
@@ -472,10 +511,10 @@ def _direction(
         nothing, most = _nothing(reason), max(coulomb.high, 0.0)
         coulomb = coulomb.withheld(reason, 0.0, most)
         return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
-    if distinct(speeds) < settings.speeds_of_a_line:
+    if distinct(speeds) < SPEEDS_OF_A_LINE:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
-    if freedom >= settings.speeds_of_a_line and distinct(speeds) >= settings.speeds_of_a_curve:
+    if freedom >= SPEEDS_OF_A_LINE and distinct(speeds) >= SPEEDS_OF_A_CURVE:
         deviations = _deviations(errors)
         plain = float(np.sum(((friction - solution[0] - solution[1] * speeds) / deviations) ** 2))
         forces = Forces(speeds, friction, np.sign(velocities), deviations, _level(deviations, errors), spent > 0)
@@ -505,9 +544,13 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
     return replace(_nothing(reason), coulomb=coulomb, viscous=viscous)
 
 
+RATIO_OF_DISTINCT_SPEEDS = 1.1
+"""Smallest ratio of two distinct speeds."""
+
+
 def distinct(speeds: np.ndarray) -> int:
     """Count the distinct speeds [m/s], shape (n,); speeds within a small ratio count as one."""
-    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(settings.ratio_of_distinct_speeds)).sum())
+    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(RATIO_OF_DISTINCT_SPEEDS)).sum())
 
 
 def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:
@@ -622,15 +665,25 @@ def local_polynomials(time: np.ndarray, values: np.ndarray, degree: int, width: 
     return out
 
 
+WIDTHS_OF_POLYNOMIALS = (5, 7, 9, 13, 19, 27, 39)
+"""Numbers of samples tried for local polynomials. Noise needs many, short moves need few."""
+
+ROWS_OF_A_STAMPED_FIT = 30
+"""Fewest samples within moves for mass and friction. With fewer, four numbers have no honest interval."""
+
+STEPS_OF_A_HOLE = 4.0
+"""Longest step between uneven instants over which a polynomial may reach, in usual steps."""
+
+
 def stamped_friction(log: Log) -> StampedFriction:
     """Identify mass, Coulomb and viscous friction from a log with a force and a velocity or position.
 
     Of several widths of the polynomials the one counts whose error is least: chance, together with the difference to
     the next narrower one. Raises InputError for a log with too little steady sliding.
     """
-    fits = [fit for width in settings.widths_of_polynomials if (fit := _fit(log, width)) is not None]
+    fits = [fit for width in WIDTHS_OF_POLYNOMIALS if (fit := _fit(log, width)) is not None]
     if not fits:
-        least = settings.rows_of_a_stamped_fit
+        least = ROWS_OF_A_STAMPED_FIT
         expected = f"{least} samples or more within moves: faster sampling, or longer moves"
         raise InputError("position", f"{len(log.time)} samples, of which fewer slide", expected, "", log.name)
     apart = [np.abs(fit.solution - other.solution) for fit, other in zip(fits, [fits[0], *fits], strict=False)]
@@ -640,7 +693,7 @@ def stamped_friction(log: Log) -> StampedFriction:
     fit, away = fits[best], apart[best]
     steps = np.diff(log.time)
     usual = float(np.median(steps))
-    regular = steps[steps <= settings.steps_of_a_hole * usual]
+    regular = steps[steps <= STEPS_OF_A_HOLE * usual]
     estimates, correlation = _estimates(log, fit, away)
     curve = fit.columns[:, 1:] @ fit.solution[1:]
     velocity, inertia = fit.columns[:, 1], fit.columns[:, 0] * fit.solution[0]
@@ -666,21 +719,29 @@ def _estimates(log: Log, fit: _StampedFit, away: np.ndarray) -> tuple[tuple[Esti
     return tuple(estimates), fit.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
 
 
+DEGREE_OF_POLYNOMIALS = 3
+"""Degree of local polynomials of force and velocity; a position has one more. With 2 a quintic move of 17 samples
+shows 3 % too much mass, with 3 0.2 %."""
+
+SPEED_SHARE_OF_STAMPED_SLIDING = 0.03
+"""Smallest speed that counts as sliding, relative to the highest."""
+
+
 def _fit(log: Log, width: int) -> _StampedFit | None:
     """Fit force = M a + F_v v + F_c sign(v) + offset within moves, with polynomials over `width` samples.
 
     The result is None if too few polynomials lie within moves in one direction and without holes.
     """
     time, force = log.time, channel(log, "force")
-    smooth = local_polynomials(time, force, settings.degree_of_polynomials, width)[0]
+    smooth = local_polynomials(time, force, DEGREE_OF_POLYNOMIALS, width)[0]
     if "velocity" in log:
-        velocity, acceleration, _ = local_polynomials(time, log["velocity"], settings.degree_of_polynomials, width)
+        velocity, acceleration, _ = local_polynomials(time, log["velocity"], DEGREE_OF_POLYNOMIALS, width)
     else:
         place = channel(log, "position")
-        _, velocity, acceleration = local_polynomials(time, place, settings.degree_of_polynomials + 1, width)
+        _, velocity, acceleration = local_polynomials(time, place, DEGREE_OF_POLYNOMIALS + 1, width)
     speed = np.abs(velocity)
-    direction = np.sign(velocity) * (speed > settings.speed_share_of_stamped_sliding * np.nanmax(speed, initial=0.0))
-    whole = np.append(np.diff(time) <= settings.steps_of_a_hole * np.median(np.diff(time)), False)
+    direction = np.sign(velocity) * (speed > SPEED_SHARE_OF_STAMPED_SLIDING * np.nanmax(speed, initial=0.0))
+    whole = np.append(np.diff(time) <= STEPS_OF_A_HOLE * np.median(np.diff(time)), False)
     groups, rows, half = np.zeros(len(time), int), np.zeros(len(time), bool), width // 2
     number = 0
     for sign in (-1.0, 1.0):
@@ -689,7 +750,7 @@ def _fit(log: Log, width: int) -> _StampedFit | None:
                 first, last = part.start + piece.start + half, part.start + piece.stop + 1 - half
                 rows[first:last], number = True, number + 1
                 groups[first:last] = number
-    if np.count_nonzero(rows) < settings.rows_of_a_stamped_fit:
+    if np.count_nonzero(rows) < ROWS_OF_A_STAMPED_FIT:
         return None
     columns = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
     if len(np.unique(np.sign(velocity[rows]))) == 1:

@@ -41,7 +41,6 @@ from friso.identification.readings.common import (
     stribeck_curve,
     t_value,
 )
-from friso.identification.readings.settings import settings
 from friso.quantities import percent
 
 
@@ -74,6 +73,22 @@ class Slips:
     share: float
 
 
+DEVIATIONS_OF_A_SLIP = 8.0
+"""Smallest speed of a slip, in standard deviations of the noise."""
+
+SPEED_SHARE_OF_A_SLIP = 0.1
+"""Speed above which a body slips, relative to the highest speed."""
+
+TIME_BEFORE_A_SLIP = 0.05  # [s]
+"""Shortest rest before a slip, which shows the rate of the force."""
+
+SAMPLES_BEFORE_A_SLIP = 10
+"""Fewest samples of the rest before a slip."""
+
+SPEED_SHARE_OF_AN_ONSET = 0.01
+"""Speed at which the motion of a slip becomes visible, relative to its highest."""
+
+
 def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
     """Find the slips in a position [m], shape (n,), differentiated below `cutoff` [Hz].
 
@@ -83,23 +98,30 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
     size = np.abs(speed)
     slow = speed[size <= np.percentile(size, 50)]
     noise = robust(slow) * 2  # of normal scatter, the slower half spreads by about half the standard deviation
-    clear = settings.deviations_of_a_slip * noise
-    threshold = max(clear, settings.speed_share_of_a_slip * float(size.max(initial=0.0)))
+    clear = DEVIATIONS_OF_A_SLIP * noise
+    threshold = max(clear, SPEED_SHARE_OF_A_SLIP * float(size.max(initial=0.0)))
     above = size > threshold
-    least = max(int(settings.time_before_a_slip / sample_time), settings.samples_before_a_slip)
+    least = max(int(TIME_BEFORE_A_SLIP / sample_time), SAMPLES_BEFORE_A_SLIP)
     edge = int(1 / (cutoff * sample_time))
     starts: list[Slip] = []
     rested = 0
     for run in runs(above):
         if run.start - rested >= least and run.start > edge and threshold > 0:
             top = run.start + int(np.argmax(size[run]))
-            level = min(max(clear, settings.speed_share_of_an_onset * float(size[top])), threshold)
+            level = min(max(clear, SPEED_SHARE_OF_AN_ONSET * float(size[top])), threshold)
             quiet = np.flatnonzero(size[rested : run.start] <= level)
             onset = rested + int(quiet[-1]) if len(quiet) else rested
-            if onset - rested >= settings.samples_before_a_slip:
+            if onset - rested >= SAMPLES_BEFORE_A_SLIP:
                 starts.append(Slip(onset, run.start - 1, rested, top, int(np.sign(speed[top]))))
         rested = run.stop
     return Slips(tuple(starts), speed, threshold, float(above.mean()) if len(above) else 0.0)
+
+
+QUICK_SWING_OF_A_STEADY_PASS = 0.02
+"""Largest fast swing of a steady velocity, relative to its mean. Aliasing may make it appear smaller."""
+
+SWING_OF_A_STEADY_PASS = 0.3
+"""Largest swing of a steady velocity, relative to its mean. With more, a body sticks and slips, or oscillates."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +143,12 @@ class Pass:
     def steady(self) -> bool:
         """Tell whether the velocity hardly swings, neither slowly nor fast."""
         speed = abs(self.velocity)
-        quick = self.quick_swing > settings.quick_swing_of_a_steady_pass * speed
-        return self.swing <= settings.swing_of_a_steady_pass * speed and not quick
+        quick = self.quick_swing > QUICK_SWING_OF_A_STEADY_PASS * speed
+        return self.swing <= SWING_OF_A_STEADY_PASS * speed and not quick
+
+
+SAMPLES_OF_A_PASS = 40
+"""Fewest samples of a stretch of constant velocity."""
 
 
 def passes(log: Log) -> tuple[Pass, ...]:
@@ -135,7 +161,7 @@ def passes(log: Log) -> tuple[Pass, ...]:
     channel(log, "force")
     stretches = []
     for part in log.segments:
-        if part.stop - part.start < settings.samples_of_a_pass:
+        if part.stop - part.start < SAMPLES_OF_A_PASS:
             continue
         spans = _of_reference(log, part) if "reference" in log else _of_motion(velocity[part], log.sample_time)
         for steady in spans:
@@ -143,6 +169,13 @@ def passes(log: Log) -> tuple[Pass, ...]:
             if np.ptp(position[span]) > 0 and velocity[span].mean() != 0:
                 stretches.append(_pass(log, span, velocity))
     return tuple(stretches)
+
+
+SHARE_IN_COMMON = 0.5
+"""Shortest common way, relative to the shortest pass."""
+
+SAMPLES_IN_COMMON = 16
+"""Fewest samples of each pass on the way that all passes share."""
 
 
 def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
@@ -153,12 +186,12 @@ def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
     position, velocity = on_bearing(log), _velocity(log)
     covered = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
     low, high = max((span[0] for span in covered), default=0.0), min((span[1] for span in covered), default=0.0)
-    if high - low < settings.share_in_common * min((span[1] - span[0] for span in covered), default=np.inf):
+    if high - low < SHARE_IN_COMMON * min((span[1] - span[0] for span in covered), default=np.inf):
         return tuple(stretches)
     cut = []
     for stretch in stretches:
         inside = stretch.span.start + np.flatnonzero((position[stretch.span] >= low) & (position[stretch.span] <= high))
-        if len(inside) < settings.samples_in_common:
+        if len(inside) < SAMPLES_IN_COMMON:
             return tuple(stretches)
         cut.append(_pass(log, slice(int(inside[0]), int(inside[-1]) + 1), velocity))
     return tuple(cut)
@@ -170,14 +203,25 @@ def places_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
     return (min(place.min() for place in places), max(place.max() for place in places)) if places else (np.nan, np.nan)
 
 
+LOW_PASS_OF_PASSES = 25.0  # [Hz]
+"""Cut-off frequency of the velocity in which stretches of constant velocity are searched."""
+
+
 def _velocity(log: Log) -> np.ndarray:
     """Return the velocity [m/s] of the body on the bearing, (n,); NaN in segments too short."""
     position = on_bearing(log)
     velocity = np.full(len(position), np.nan)
     for part in log.segments:
-        if part.stop - part.start >= settings.samples_of_a_pass:
-            velocity[part] = rate(position[part], log.sample_time, settings.low_pass_of_passes)
+        if part.stop - part.start >= SAMPLES_OF_A_PASS:
+            velocity[part] = rate(position[part], log.sample_time, LOW_PASS_OF_PASSES)
     return velocity
+
+
+ACCELERATION_OF_A_CONSTANT_SPEED = 0.02
+"""Acceleration below which the reference has constant velocity, relative to its largest."""
+
+SPEED_SHARE_OF_CREEPING = 1e-4
+"""Speed below which a body creeps, relative to the highest speed."""
 
 
 def _of_reference(log: Log, part: slice) -> list[slice]:
@@ -186,11 +230,18 @@ def _of_reference(log: Log, part: slice) -> list[slice]:
     `part` are the samples of a segment. Standstill does not count.
     """
     reference = channel(log, "reference")[part]
-    velocity = np.gradient(low_pass(reference, log.sample_time, settings.low_pass_of_passes), log.sample_time)
+    velocity = np.gradient(low_pass(reference, log.sample_time, LOW_PASS_OF_PASSES), log.sample_time)
     acceleration = np.abs(np.gradient(velocity, log.sample_time))
-    steady = acceleration <= settings.acceleration_of_a_constant_speed * float(acceleration.max())
-    moving = np.abs(velocity) > settings.speed_share_of_creeping * float(np.abs(velocity).max())
+    steady = acceleration <= ACCELERATION_OF_A_CONSTANT_SPEED * float(acceleration.max())
+    moving = np.abs(velocity) > SPEED_SHARE_OF_CREEPING * float(np.abs(velocity).max())
     return _trimmed(steady & moving, log.sample_time, 0.1)
+
+
+CHANGE_OF_A_KEPT_VELOCITY = 0.1
+"""Largest change of a constant velocity within a period of the cut-off."""
+
+SPEED_SHARE_OF_SETTLING = 1e-3
+"""Speed below which a body settles rather than keeps its velocity, relative to the highest (friso's choice)."""
 
 
 def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
@@ -199,18 +250,22 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
     The acceleration is within the noise there, or small compared with the largest acceleration and with the velocity. A
     stretch that swings throughout counts as well.
     """
-    smooth = low_pass(velocity, sample_time, settings.low_pass_of_passes / 2)
+    smooth = low_pass(velocity, sample_time, LOW_PASS_OF_PASSES / 2)
     acceleration, speed = np.abs(np.gradient(smooth, sample_time)), np.abs(smooth)
     noise, top = 5 * robust(np.gradient(smooth, sample_time)), float(speed.max())
-    gentle = settings.acceleration_of_a_constant_speed * float(np.percentile(acceleration, 99.5))
-    moving = speed > max(settings.speed_share_of_creeping * top, 8 * robust(velocity - smooth))
-    kept_velocity = settings.change_of_a_kept_velocity * settings.low_pass_of_passes * speed
+    gentle = ACCELERATION_OF_A_CONSTANT_SPEED * float(np.percentile(acceleration, 99.5))
+    moving = speed > max(SPEED_SHARE_OF_CREEPING * top, 8 * robust(velocity - smooth))
+    kept_velocity = CHANGE_OF_A_KEPT_VELOCITY * LOW_PASS_OF_PASSES * speed
     even = moving & (acceleration <= np.maximum(np.minimum(gentle, kept_velocity), noise))
-    swinging = moving & (speed > settings.speed_share_of_settling * top) & (acceleration <= max(gentle, noise))
+    swinging = moving & (speed > SPEED_SHARE_OF_SETTLING * top) & (acceleration <= max(gentle, noise))
     kept = _trimmed(even, sample_time, 0.0)
     others = _trimmed(swinging, sample_time, 0.0)
     kept += [one for one in others if not any(one.start < other.stop and other.start < one.stop for other in kept)]
     return sorted(kept, key=lambda one: one.start)
+
+
+TIME_OF_A_PASS = 0.1  # [s]
+"""Shortest stretch of constant velocity, the settling time of the filter."""
 
 
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
@@ -219,8 +274,8 @@ def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
     Both ends are cut by the filter's settling time, and the start by a further fraction, `share`, for the axis to
     settle.
     """
-    edge = int(1 / (settings.low_pass_of_passes * sample_time))
-    least = max(int(settings.time_of_a_pass / sample_time), settings.samples_of_a_pass)
+    edge = int(1 / (LOW_PASS_OF_PASSES * sample_time))
+    least = max(int(TIME_OF_A_PASS / sample_time), SAMPLES_OF_A_PASS)
     stretches = []
     for run in runs(mask):
         begin, end = run.start + edge + int(share * (run.stop - run.start)), run.stop - edge
@@ -238,17 +293,28 @@ def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
     return Pass(span, float(went.mean()), float(went.std()), quick, force, acceleration)
 
 
+ROUNDING_OF_A_STEP = 1e-6
+"""Largest step of a position that counts as rounding error, relative to the largest step."""
+
+ERROR_OF_WHOLE_DIGITS = 0.1
+"""Largest distance of steps from multiples of the resolution."""
+
+
 def _digit(position: np.ndarray) -> float:
     """Return the resolution [m] of a position: the smallest step, if all steps are multiples.
 
     Otherwise, and for a position that never changes, the result is 0.
     """
     steps = np.abs(np.diff(position))
-    steps = steps[steps > settings.rounding_of_a_step * steps.max(initial=0.0)]
+    steps = steps[steps > ROUNDING_OF_A_STEP * steps.max(initial=0.0)]
     if not len(steps):
         return 0.0
     digits = steps / steps.min()
-    return float(steps.min()) if np.abs(digits - np.rint(digits)).max() < settings.error_of_whole_digits else 0.0
+    return float(steps.min()) if np.abs(digits - np.rint(digits)).max() < ERROR_OF_WHOLE_DIGITS else 0.0
+
+
+POWER_OF_A_CLEAR_LINE = 20.0
+"""Smallest power of a spectral line that stands out of the noise, relative to the median."""
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
@@ -261,10 +327,10 @@ def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> floa
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
     frequency = np.fft.rfftfreq(len(position), sample_time)
     lobe = 2 / (len(position) * sample_time)  # half a main lobe of the window, to separate the lines
-    above = frequency > settings.low_pass_of_passes + lobe
+    above = frequency > LOW_PASS_OF_PASSES + lobe
     if not above.any():
         return 0.0
-    power = np.where(above & (lines > settings.power_of_a_clear_line * np.median(lines[above])), lines, 0.0)
+    power = np.where(above & (lines > POWER_OF_A_CLEAR_LINE * np.median(lines[above])), lines, 0.0)
     if power.sum() < digit**2:
         return 0.0
     return float(np.sqrt(np.sum(power * (2 * np.pi * frequency) ** 2)))
@@ -292,6 +358,22 @@ class Ramps:
     notes: tuple[str, ...]
 
 
+LOW_PASS_OF_RAMPS = 100.0  # [Hz]
+"""Cut-off frequency of force and velocity in force ramps."""
+
+PERIODS_OF_A_RAMP = 2.0
+"""Shortest second half of a ramp whose break-away can be read, in periods of the low-pass."""
+
+SAMPLES_OF_A_RAMP = 5
+"""Fewest samples from which the rate of a ramp is read."""
+
+SAMPLES_WITH_A_RAMP = 20
+"""Fewest samples of a segment with a ramp."""
+
+FORCE_SHARE_OF_A_START = 0.5
+"""Largest initial force of a ramp, relative to break-away. With more, bristles are bent already."""
+
+
 def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     """Find the ramps of the force in a log, each from rest of the body on the bearing.
 
@@ -301,17 +383,17 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     """
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
-    cutoff, threshold, quick, stops = settings.low_pass_of_ramps, 0.0, 0, 0
-    shortest = max(settings.periods_of_a_ramp / (cutoff * log.sample_time), settings.samples_of_a_ramp)
+    cutoff, threshold, quick, stops = LOW_PASS_OF_RAMPS, 0.0, 0, 0
+    shortest = max(PERIODS_OF_A_RAMP / (cutoff * log.sample_time), SAMPLES_OF_A_RAMP)
     for part in log.segments:
-        if part.stop - part.start < settings.samples_with_a_ramp:
+        if part.stop - part.start < SAMPLES_WITH_A_RAMP:
             continue
         breaks = slips(body[part], log.sample_time, cutoff)
         threshold = max(threshold, breaks.threshold)
         pushed = low_pass(force[part], log.sample_time, cutoff)
         for onset, start, rest, fastest, direction in breaks.starts:
             push = direction * force[part][rest : start + 1]
-            if _lowest(push) > settings.force_share_of_a_start * float(direction * pushed[start]) > 0:
+            if _lowest(push) > FORCE_SHARE_OF_A_START * float(direction * pushed[start]) > 0:
                 stops += 1
                 continue
             begin = rest + _half(push)
@@ -346,14 +428,18 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     return Ramps(times, places, directions, forces, rates, unsure, late, speeds, threshold, tuple(notes))
 
 
+SMOOTHING_OF_A_RAMP = 40
+"""Divisor of a ramp's number of samples that gives the smoothing width for finding the ramp's second half."""
+
+
 def _lowest(push: np.ndarray) -> float:
     """Return the smallest smoothed force [N] on a body during its rest before a motion."""
-    return float(smoothed(push, len(push) / settings.smoothing_of_a_ramp).min())
+    return float(smoothed(push, len(push) / SMOOTHING_OF_A_RAMP).min())
 
 
 def _half(push: np.ndarray) -> int:
     """Return the last sample at which a smoothed force is at most the mean of its end values."""
-    smooth = smoothed(push, len(push) / settings.smoothing_of_a_ramp)
+    smooth = smoothed(push, len(push) / SMOOTHING_OF_A_RAMP)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])
 
 
@@ -375,14 +461,18 @@ class Peak:
     unsure: float
 
 
+DEVIATIONS_OF_A_KERNEL = 4
+"""Half-width at which the smoothing Gaussian is cut off, in standard deviations."""
+
+
 def smoothed(values: np.ndarray, width: float) -> np.ndarray:
     """Smooth values, shape (n,), by a Gaussian of `width` samples.
 
     Beyond its ends, the signal is continued by point reflection about its end values.
     """
-    more = min(int(settings.deviations_of_a_kernel * width) + 1, len(values) - 1)
+    more = min(int(DEVIATIONS_OF_A_KERNEL * width) + 1, len(values) - 1)
     longer = np.pad(values, more, mode="reflect", reflect_type="odd")
-    return gaussian_filter1d(longer, width, truncate=settings.deviations_of_a_kernel)[more : len(longer) - more]
+    return gaussian_filter1d(longer, width, truncate=DEVIATIONS_OF_A_KERNEL)[more : len(longer) - more]
 
 
 def scatter(values: np.ndarray) -> float:
@@ -396,6 +486,13 @@ def scatter(values: np.ndarray) -> float:
 def _second(values: np.ndarray) -> np.ndarray:
     """Return second differences, shape (n,); 0 at the ends."""
     return np.pad(np.diff(values, 2), 1)
+
+
+RAMP_SHARE_OF_A_WIDTH = 0.1
+"""Largest width of the smoothing Gaussian, relative to the second half of a ramp."""
+
+WIDTHS_TRIED = 12
+"""Number of widths of the smoothing Gaussian among which the best is chosen."""
 
 
 def peak(
@@ -417,7 +514,7 @@ def peak(
     rest = slice(begin, (begin + start) // 2)
     noise = scatter(force[rest]), mass / sample_time**2 * scatter(position[rest])
     least = max(GAUSSIAN_WIDTH / (cutoff * sample_time), 1.0)
-    widths = np.geomspace(least, max(settings.ramp_share_of_a_width * (start - begin), least), settings.widths_tried)
+    widths = np.geomspace(least, max(RAMP_SHARE_OF_A_WIDTH * (start - begin), least), WIDTHS_TRIED)
     # deviations of white noise under a Gaussian, and under its second derivative
     left = np.hypot(noise[0] / np.sqrt(2 * np.pi**0.5 * widths), noise[1] * np.sqrt(3 / (8 * np.pi**0.5 * widths**5)))
     high = left * np.sqrt(2 * np.log(1 + (start - begin) / (2 * widths)))
@@ -447,13 +544,21 @@ def break_away(
     return float(max(np.max(level * creep), coulomb))
 
 
+LEAST_BRISTLE_RATE = 100.0  # [N/s]
+"""Least product of bristle stiffness and Stribeck velocity, of Canudas de Wit et al. 1995; the thesis has 160."""
+
+
 def share_below(force_rate: float) -> float:
     """Return by which fraction break-away may lie below static friction at a rate [N/s].
 
     The bound holds whatever the Coulomb friction is, if bristle stiffness times Stribeck velocity is at least the
     setting `least_bristle_rate`. Returns 1 for rates at which nothing can be concluded.
     """
-    return min(1 - break_away(force_rate, 1.0, 0.0, settings.least_bristle_rate, 1.0), 1.0)
+    return min(1 - break_away(force_rate, 1.0, 0.0, LEAST_BRISTLE_RATE, 1.0), 1.0)
+
+
+SPREAD_OF_RATES = 3.0
+"""Smallest ratio of highest to lowest force rate at which break-aways are extrapolated to rate 0."""
 
 
 def static_friction(
@@ -472,11 +577,15 @@ def static_friction(
         low = float(np.min(forces)) if len(forces) else 0.0
         return Estimate.unknown(name, "N", "break-away forces", f"{len(forces)} break-aways: 3 are needed", low)
     low, high = np.percentile(rates, [10, 90])
-    if high >= settings.spread_of_rates * low > 0:
+    if high >= SPREAD_OF_RATES * low > 0:
         estimate = _extrapolated(name, forces, rates, relative_error)
     else:
         estimate = _bounded(name, forces, rates, relative_error)
     return replace(estimate, low=max(float(estimate.low - late), 0.0), systematic=estimate.systematic + late / 2)
+
+
+SHARE_EXTRAPOLATED = 0.15
+"""Largest extrapolation or bound, relative to static friction."""
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
@@ -492,10 +601,10 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
     half = float(np.hypot(scatter, t_value(mean.freedom) * relative_error * mean.value))
     low, high = mean.value - half, (mean.value + half) / (1 - share) if share < 1 else np.inf
     low, high = float(low), float(high)
-    if share > 2 * settings.share_extrapolated:
+    if share > 2 * SHARE_EXTRAPOLATED:
         reason = (
             f"at {np.median(rates):.3g} N/s ramps may break away up to {percent(share)} below static friction; ramps "
-            f"below {_slow_enough():.2g} N/s, or at rates more than {settings.spread_of_rates:g} times apart, would "
+            f"below {_slow_enough():.2g} N/s, or at rates more than {SPREAD_OF_RATES:g} times apart, would "
             "show it"
         )
         return Estimate.unknown(name, "N", method, reason, low, high)
@@ -505,8 +614,8 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
 
 def _slow_enough() -> float:
     """Return the highest force rate [N/s] at which ramps of a single rate show static friction."""
-    rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
-    return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
+    rates = LEAST_BRISTLE_RATE * np.geomspace(1e-6, 1, 145)
+    return float(max(rate for rate in rates if share_below(rate) <= 2 * SHARE_EXTRAPOLATED))
 
 
 def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None:
@@ -534,6 +643,10 @@ def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None
     return Estimate.unknown(name, "N", "break-away forces", reason, max(float(solution[0] - errors[0]), 0.0), low)
 
 
+RANGE_OF_RATES = 12.0
+"""Largest ratio of used force rates to the lowest. The power law holds for small rates only."""
+
+
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
     """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3).
 
@@ -542,7 +655,7 @@ def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_err
     rises = _rising(name, forces, rates)
     if rises is not None:
         return rises
-    near = rates <= max(settings.range_of_rates * rates.min(), np.sort(rates)[2])
+    near = rates <= max(RANGE_OF_RATES * rates.min(), np.sort(rates)[2])
     if np.ptp(rates[near]) == 0:
         return _bounded(name, forces[near], rates[near], relative_error)
     power = rates[near] ** (2 / 3)
@@ -554,11 +667,11 @@ def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_err
     method = f"break-away forces at {rates[near].min():.3g} to {rates[near].max():.3g} N/s, extrapolated to 0"
     least = float(np.mean(forces[rates <= 1.5 * rates.min()]))
     if slope + t_value(freedom) * inverse[1, 1] ** 0.5 >= 0:
-        if share_below(float(rates.min())) <= settings.share_extrapolated:
+        if share_below(float(rates.min())) <= SHARE_EXTRAPOLATED:
             return _bounded(name, forces[near], np.full(int(near.sum()), rates.min()), relative_error)
         reason = "break-away does not fall with the force rate: the rates may be too high to show static friction"
         return Estimate.unknown(name, "N", method, reason, least)
-    if offset > settings.share_extrapolated * level:
+    if offset > SHARE_EXTRAPOLATED * level:
         reason = f"the lowest force rate, {rates.min():.3g} N/s, is too high: the forces still rise towards rate 0"
         return Estimate.unknown(name, "N", method, reason, least)
     return by_t(name, "N", Mean(float(level), error, freedom), method, offset / 2, offset / 2)

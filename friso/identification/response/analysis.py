@@ -38,8 +38,16 @@ from friso.identification.response.records import (
     multisine,
     relative_error,
 )
-from friso.identification.response.settings import settings
 from friso.quantities import percent
+
+SAMPLES_OF_A_FEEDBACK_TEST = 600
+"""Fewest samples of a test for feedback."""
+
+CHANCE_OF_FEEDBACK = 1e-6
+"""Probability (F-test) below which the output counts as predicting the input."""
+
+SHARE_OF_SURPRISE = 0.05
+"""Least fraction of the input's unpredicted part that the output must explain."""
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
@@ -52,15 +60,19 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     The present sample of the output counts as past, because a position cannot react to a force within one sample.
     `direct` is true for an output that does, such as an acceleration.
     """
-    record = record.checked(settings.samples_of_a_feedback_test)
+    record = record.checked(SAMPLES_OF_A_FEEDBACK_TEST)
     driven, answer = _surprising(record)
     if driven is None or answer is None:
         return ()
     chance, share = _foretold(driven, answer, direct)
-    if chance > settings.chance_of_feedback or share < settings.share_of_surprise:
+    if chance > CHANCE_OF_FEEDBACK or share < SHARE_OF_SURPRISE:
         return ()
     finding = f"the output predicts {percent(share)} of the innovation of the input (chance {chance:.1g})"
     return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
+
+
+DIFFERENCE_OF_PLAYED_PERIODS = 1e-6
+"""Relative difference between periods of an input below which it was played from a table."""
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -78,9 +90,16 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
         samples = values[periods.start : periods.stop]
         samples = samples - drift(samples, periods.samples)
         parts.append((samples.reshape(periods.count, -1) - samples.reshape(periods.count, -1).mean(axis=0)).ravel())
-    if np.std(parts[0]) <= settings.difference_of_played_periods * np.std(record.input):
+    if np.std(parts[0]) <= DIFFERENCE_OF_PLAYED_PERIODS * np.std(record.input):
         return None, None
     return parts[0], parts[1]
+
+
+PAST_OF_THE_INPUT = 60
+"""Number of past samples of the input from which the input is predicted."""
+
+PAST_OF_THE_OUTPUT = 8
+"""Number of past samples of the output from which the input is predicted."""
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
@@ -89,7 +108,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     With `direct`, the present sample of the output is no past. Returns the probability (F-test) that the output's past
     does not help, and the fraction of the input's unpredicted part that it explains.
     """
-    own, others, first = settings.past_of_the_input, settings.past_of_the_output, int(direct)
+    own, others, first = PAST_OF_THE_INPUT, PAST_OF_THE_OUTPUT, int(direct)
     target = driven[own:]
     past = [driven[own - lag : -lag] for lag in range(1, own + 1)]
     other = [answer[own - lag : len(answer) - lag] for lag in range(first, others + first)]
@@ -154,6 +173,13 @@ class Departure:
     ratio: float
 
 
+LINES_OF_A_WINDOW = 9
+"""Number of neighbouring lines tested together: scatter averages out over them, a departure does not."""
+
+CHANCE_OF_A_DEPARTURE = 0.01
+"""Probability below which a window of lines departs from the model."""
+
+
 def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndarray]) -> Departure:
     """Find where a response leaves `model`, a function of frequencies [Hz], at its low end.
 
@@ -162,23 +188,23 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     departure ends with the highest window that differs. Raises InputError for fewer than 36 lines.
     """
     frequency = response.frequency
-    if len(frequency) < 4 * settings.lines_of_a_window:
-        least = f"at least {4 * settings.lines_of_a_window} lines"
+    if len(frequency) < 4 * LINES_OF_A_WINDOW:
+        least = f"at least {4 * LINES_OF_A_WINDOW} lines"
         raise InputError("response", f"{len(frequency)} lines", least, "a multisine of 100 lines")
     ratio = response.response / model(frequency)
     weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
-    half, ones = len(frequency) // 2, np.ones(settings.lines_of_a_window)
+    half, ones = len(frequency) // 2, np.ones(LINES_OF_A_WINDOW)
     pulls = np.abs(np.convolve(weight * (ratio - 1), ones, "valid")) ** 2 / np.convolve(weight, ones, "valid") / 2
     scale = max(float(np.mean(pulls[half:])), 1.0)
-    limit = scale * stats.f.ppf(1 - settings.chance_of_a_departure, 2, max(np.median(response.degrees), 2.0))
+    limit = scale * stats.f.ppf(1 - CHANCE_OF_A_DEPARTURE, 2, max(np.median(response.degrees), 2.0))
     off = np.flatnonzero(pulls[:half] > limit)
-    name, method = "departure frequency", f"mean over {settings.lines_of_a_window} lines, against the linear model"
+    name, method = "departure frequency", f"mean over {LINES_OF_A_WINDOW} lines, against the linear model"
     if not off.size:
         reason = "the response follows the model down to its lowest line"
         onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
-    last = int(off[-1]) + settings.lines_of_a_window - 1
-    places = last - settings.lines_of_a_window // 2, last - settings.lines_of_a_window + 1, last
+    last = int(off[-1]) + LINES_OF_A_WINDOW - 1
+    places = last - LINES_OF_A_WINDOW // 2, last - LINES_OF_A_WINDOW + 1, last
     value, low, high = (float(frequency[place]) for place in places)
     onset = Estimate(name, "Hz", value, low, high, method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
@@ -195,7 +221,7 @@ def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, floa
         return None, np.nan
     ratio = np.median((noise**2 + distortion**2) / noise**2)
     degrees = float(np.median(response.degrees))
-    return bool(ratio > stats.f.ppf(1 - settings.chance_of_a_departure, degrees, 10 * degrees)), float(np.sqrt(ratio))
+    return bool(ratio > stats.f.ppf(1 - CHANCE_OF_A_DEPARTURE, degrees, 10 * degrees)), float(np.sqrt(ratio))
 
 
 FrequencyRange = tuple[float, float]
@@ -252,6 +278,10 @@ class Realisations:
         return fit_two_mass(driven, other[0] if other else None, band)
 
 
+FREQUENCY_ABOVE_FRICTION = 1 / 7
+"""Frequency below which friction may distort a response, relative to its highest measured frequency."""
+
+
 def analyse(
     logs: Sequence[Log],
     band: FrequencyRange | None = None,
@@ -270,7 +300,7 @@ def analyse(
         driven, other = _clear(runs.responses())
     warnings = [text for record in positions if record.reference is None for text in feedback(record)]
     lowest, highest = float(driven.frequency[0]), float(driven.frequency[-1])
-    first = band or (max(lowest, highest * settings.frequency_above_friction), _top(driven))
+    first = band or (max(lowest, highest * FREQUENCY_ABOVE_FRICTION), _top(driven))
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
         model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model

@@ -14,7 +14,6 @@ from scipy import stats
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.records import FrequencyResponse
-from friso.identification.response.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 
 LARGEST_TURN = np.radians(30)
@@ -79,16 +78,24 @@ def straight_lines(
     return tuple(sorted(lines, key=lambda line: line.low))
 
 
+SCATTER_OF_A_STRAIGHT_LINE = 0.02
+"""Relative scatter allowed on a straight line beyond its noise, by drives, guides and cables."""
+
+
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
     """Tell whether the slope of a band clearly differs from the next higher and lower slopes.
 
     `band` has the indices of its first and last spectral line, and its sign.
     """
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
-    weight = 1 / (relative**2 / 2 + settings.scatter_of_a_straight_line**2)
+    weight = 1 / (relative**2 / 2 + SCATTER_OF_A_STRAIGHT_LINE**2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
     spread = np.sum(weight * octave**2)
     return bool(abs(np.sum(weight * octave * level) / spread) + 2 / np.sqrt(spread) < 0.5)
+
+
+FACTOR_BETWEEN_LINES = 1.5
+"""Factor by which the level between two straight lines must differ from both to show a mode, not a bend."""
 
 
 def _parted(
@@ -104,7 +111,7 @@ def _parted(
     between = level[lower[1] + 1 : upper[0]]
     means = [np.mean(level[band[0] : band[1] + 1]) for band in (lower, upper)]
     off = np.abs(between[:, None] - means).min(axis=1, initial=np.inf)
-    return bool(np.any(off > np.log(settings.factor_between_lines)))
+    return bool(np.any(off > np.log(FACTOR_BETWEEN_LINES)))
 
 
 def _widest(
@@ -121,6 +128,16 @@ def _widest(
     return max(bands, key=lambda limits: frequency[limits[1]] / frequency[limits[0]], default=None)
 
 
+LINES_OF_A_BAND = 4
+"""Fewest spectral lines of a straight line. Fewer leave its slope uncertain."""
+
+EDGES_TRIED = 300
+"""Largest number of frequencies tried as ends of a band."""
+
+OCTAVES_OF_A_BAND = 0.4
+"""Narrowest band of a straight line, in octaves. In narrower bands the slope is uncertain."""
+
+
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
     """Return the indices of the first and last spectral line of the widest straight band.
 
@@ -128,22 +145,22 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
     this `sign`. Spectral lines from `start` to before `stop` are searched; at most `edges_tried` evenly spaced ones are
     tried as ends. Returns None if no such band is wide enough.
     """
-    if stop - start < settings.lines_of_a_band:
+    if stop - start < LINES_OF_A_BAND:
         return None
     frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
-    weight = 2 / (relative**2 + 2 * settings.scatter_of_a_straight_line**2)
+    weight = 2 / (relative**2 + 2 * SCATTER_OF_A_STRAIGHT_LINE**2)
     sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > LARGEST_TURN + 2 * relative])
     sums = np.concatenate([np.zeros((4, 1)), np.cumsum(sums, axis=1)], axis=1)
-    step = max(1, -(-len(frequency) // settings.edges_tried))
+    step = max(1, -(-len(frequency) // EDGES_TRIED))
     first, last = np.arange(0, len(frequency), step)[:, None], np.arange(0, len(frequency), step)[None, :]
     count = last - first + 1
     total, linear, square, turned = sums[:, np.maximum(last + 1, first)] - sums[:, np.minimum(first, last + 1)]
     with np.errstate(divide="ignore", invalid="ignore"):
         even = square - linear**2 / total <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1))
-        good = (count >= settings.lines_of_a_band) & (turned == 0) & even
+        good = (count >= LINES_OF_A_BAND) & (turned == 0) & even
     width = np.where(good, np.log2(frequency[last] / frequency[first]), -1.0)
     i, j = np.unravel_index(np.argmax(width), width.shape)
-    if width[i, j] < settings.octaves_of_a_band:
+    if width[i, j] < OCTAVES_OF_A_BAND:
         return None
     return start + int(first[i, 0]), start + int(last[0, j])
 
@@ -191,7 +208,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     drawn at random (`benchmarks/identify.py`).
     """
     _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
-    weight = 1 / (relative**2 / 2 + settings.scatter_of_a_straight_line**2)
+    weight = 1 / (relative**2 / 2 + SCATTER_OF_A_STRAIGHT_LINE**2)
     columns, coefficients = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
     residual = level - columns @ coefficients
@@ -231,7 +248,7 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
     """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
-    gone = frequency[np.abs(level - mean) > np.log(settings.factor_between_lines)]
+    gone = frequency[np.abs(level - mean) > np.log(FACTOR_BETWEEN_LINES)]
     above, below = gone[gone > inside[-1]], gone[gone < inside[0]]
     up = above[0] / inside[-1] if above.size else np.inf
     down = inside[0] / below[-1] if below.size else np.inf

@@ -22,9 +22,14 @@ from scipy import stats
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.modes import ResponseFit, ResponseTarget, deviations, fit_modes
+from friso.identification.response.modes import (
+    MISFIT_OF_A_RIGHT_MODEL,
+    ResponseFit,
+    ResponseTarget,
+    deviations,
+    fit_modes,
+)
 from friso.identification.response.records import FrequencyResponse
-from friso.identification.response.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 
 METHOD = "two-mass model fitted to the response"
@@ -133,6 +138,13 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
     return (masses + compliances) * np.exp(-2j * np.pi * frequency * delay)
 
 
+PERIODS_OF_A_DELAY = 0.4
+"""Largest delay, in periods of the highest frequency. A drive with four samples per period is late by 0.38."""
+
+PERIODS_OF_A_SAMPLE = 0.25
+"""Usual largest sample time if it is not known, in periods of the highest frequency."""
+
+
 def _fitting(
     masses: Callable[..., np.ndarray],
     own: int,
@@ -151,9 +163,9 @@ def _fitting(
     values = np.stack([sign * part.response for part, sign in zip(parts, signs, strict=False)])
     deviation = np.stack([deviations(part) for part in parts])
     target = ResponseTarget(partial(masses, frequency=frequency), values, deviation)
-    late, free = settings.periods_of_a_delay / float(frequency[-1]), np.full(len(parts), np.inf)
+    late, free = PERIODS_OF_A_DELAY / float(frequency[-1]), np.full(len(parts), np.inf)
     longest = (_longest(responses[0], 0.5) / ONE_THOUSANDTH) ** 2
-    half = (_longest(responses[0], settings.periods_of_a_sample) / ONE_THOUSANDTH) ** 2 / 2  # from 0 to a sample time
+    half = (_longest(responses[0], PERIODS_OF_A_SAMPLE) / ONE_THOUSANDTH) ** 2 / 2  # from 0 to a sample time
 
     def fitted(start: np.ndarray, lower: Sequence[float], upper: Sequence[float]) -> ResponseFit:
         low, high = np.array([*lower, -late, 0.0, *-free]), np.array([*upper, late, longest, *free])
@@ -197,6 +209,10 @@ def fit_two_mass(
     return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
 
 
+STARTS_REFINED = 3
+"""Number of starting points of the one-mass fit that are refined."""
+
+
 def fit_one_mass(
     responses: list[FrequencyResponse], signs: tuple[float, ...], band: tuple[float, float]
 ) -> ResponseFit:
@@ -206,9 +222,16 @@ def fit_one_mass(
     below the band; the best is returned.
     """
     target, frequency, fitted = _fitting(one_mass, OF_ONE, responses, signs, band)
-    starts = sorted(_starts_of_one(target.response, frequency), key=target.misfit)[: settings.starts_refined]
+    starts = sorted(_starts_of_one(target.response, frequency), key=target.misfit)[:STARTS_REFINED]
     fits = [fitted(start, [-np.inf, 0.0, 0.0], [np.inf] * 3) for start in starts]
     return min(fits, key=lambda fit: fit.squares)
+
+
+SQUARES_LEFT_BY_TWO = 0.5
+"""Largest ratio of the sums of squares of two masses and one mass for two masses to be needed."""
+
+CHANCE_OF_TWO_MASSES = 1e-3
+"""Probability that noise alone makes two masses fit so much better."""
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
@@ -223,7 +246,7 @@ def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyRespons
     free, more = max(two.count - len(two.parameters), 1), len(two.parameters) - len(one.parameters)
     better = (one.squares - two.squares) / more / (two.squares / free)
     chance = float(stats.f.sf(better, more, free)) * one.count / (2 * len(responses))
-    return two.squares < settings.squares_left_by_two * one.squares and chance < settings.chance_of_two_masses
+    return two.squares < SQUARES_LEFT_BY_TWO * one.squares and chance < CHANCE_OF_TWO_MASSES
 
 
 def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
@@ -259,13 +282,17 @@ def _sign(response: np.ndarray) -> float:
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
+MISFIT_OF_NO_MODEL = 0.4
+"""RMS logarithm of the ratio of response to model above which the model does not describe the response."""
+
+
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
     """Check that a model follows a response, shape (outputs, lines), at least roughly.
 
     Raises InputError if it misses the magnitude by too large a factor on average.
     """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
-    if off > settings.misfit_of_no_model:
+    if off > MISFIT_OF_NO_MODEL:
         text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
         raise InputError("response", text, expected, "")
@@ -323,9 +350,13 @@ def _best(
     fits = []
     for start in starts():
         fits.append(fitted(start, [*(start[:DRAG] - reach), 0.0, 0.0], [*(start[:DRAG] + reach), np.inf, np.inf]))
-        if fits[-1].reduced < settings.misfit_of_a_right_model:
+        if fits[-1].reduced < MISFIT_OF_A_RIGHT_MODEL:
             break
     return min(fits, key=lambda fit: fit.squares), values
+
+
+WIDTH_OF_A_START = 0.1
+"""Half-width of the mode of the mass on its spring from which a fit starts, relative to its frequency."""
 
 
 def _starts_of_one(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
@@ -336,12 +367,16 @@ def _starts_of_one(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
     starts = []
     for corner, mode in product(places, places):
-        drag, spring = corner + settings.width_of_a_start * mode, mode**2
+        drag, spring = corner + WIDTH_OF_A_START * mode, mode**2
         rest = np.zeros(COMPLIANCES + len(values))
         shape = one_mass(np.array([0.0, drag, spring, *rest]), frequency)[0]
         level = float(np.mean(np.log(np.abs(shape) / np.abs(values[0]))))
         starts.append(np.array([level, drag * np.exp(level), spring * np.exp(level), *rest]))
     return starts
+
+
+RESONANCE_RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
+"""Ratios of resonance to antiresonance from which the fit starts."""
 
 
 def _starts_of_two(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
@@ -351,7 +386,7 @@ def _starts_of_two(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.nda
     """
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
     resonance = frequency[1 + int(np.argmax(level[1:-1]))]
-    for ratio in settings.resonance_ratios:
+    for ratio in RESONANCE_RATIOS:
         other = 1 - 1 / ratio**2
         stiffness = other * (2 * np.pi * resonance / ratio) ** 2
         damping = 0.1 * np.sqrt(stiffness * other)
@@ -370,7 +405,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
         yield "the second output has the opposite sign of the first: it was reversed"
-    if fit.reduced > settings.misfit_of_a_right_model:
+    if fit.reduced > MISFIT_OF_A_RIGHT_MODEL:
         yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
 
 

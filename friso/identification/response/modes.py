@@ -27,6 +27,10 @@ ResponseModel = Callable[[np.ndarray], np.ndarray]
 NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
 
 
+FACTOR_OF_A_LOOSE_INTERVAL = 1e3
+"""Factor to either side beyond which a linear interval of a positive quantity means nothing."""
+
+
 @dataclass(frozen=True)
 class ResponseFit:
     """Parameters (p,) fitted to responses, with their covariance (p, p).
@@ -79,9 +83,9 @@ class ResponseFit:
         plain = Estimate.normal(name, unit, value, deviation, method)
         if not positive:
             return plain
-        factor = np.exp(min(plain.half_width / value, np.log(2 * settings.factor_of_a_loose_interval)))
-        if not factor < settings.factor_of_a_loose_interval:
-            reason = f"its interval spans more than a factor of {settings.factor_of_a_loose_interval:g} to either side"
+        factor = np.exp(min(plain.half_width / value, np.log(2 * FACTOR_OF_A_LOOSE_INTERVAL)))
+        if not factor < FACTOR_OF_A_LOOSE_INTERVAL:
+            reason = f"its interval spans more than a factor of {FACTOR_OF_A_LOOSE_INTERVAL:g} to either side"
             return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
 
@@ -101,6 +105,10 @@ def deviations(response: FrequencyResponse) -> np.ndarray:
     Every deviation is at least a thousandth of the response, because no model is more accurate.
     """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
+
+
+TOLERANCE_OF_A_FIT = 1e-6
+"""Relative change of squares or parameters that ends a fit, far below their noise."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +140,7 @@ class ResponseTarget:
         weight, places = np.sqrt(2) / self.deviation, list(believed)
         middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
         (outputs, lines), count = self.response.shape, 2 * self.response.size
-        free, tolerance = max(count - len(start), 1), settings.tolerance_of_a_fit
+        free, tolerance = max(count - len(start), 1), TOLERANCE_OF_A_FIT
         options: Any = {"x_scale": "jac", "ftol": tolerance, "xtol": tolerance, "max_nfev": 200}
 
         def solved(first: np.ndarray, scale: float) -> OptimizeResult:
@@ -197,6 +205,13 @@ class Modes:
         return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
 
 
+ERROR_OF_A_RESPONSE = 0.01
+"""Smallest relative error of a spectral line, which keeps a few strong lines from dominating the fit."""
+
+MISFIT_OF_A_RIGHT_MODEL = 3.0
+"""Largest sum of squares over degrees of freedom of a model that counts as right."""
+
+
 def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None) -> Modes:
     """Fit modes to a force-to-position response in a `band` [Hz] (default: all lines).
 
@@ -208,7 +223,7 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
         raise InputError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
     scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
     s = 1j * part.frequency / scale
-    deviation = np.hypot(part.scatter(), settings.error_of_a_response * np.abs(part.response))
+    deviation = np.hypot(part.scatter(), ERROR_OF_A_RESPONSE * np.abs(part.response))
     kinds = (True, False) if rigid is None else (rigid,)
     rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, settings.modes_at_most)]
     shape, start, *_ = simplest_model(rows)
@@ -217,7 +232,7 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
     fit = target.refined(start, low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
     warnings = [*_cancelling(fit, shape, scale, limits)]
-    if fit.reduced > settings.misfit_of_a_right_model:
+    if fit.reduced > MISFIT_OF_A_RIGHT_MODEL:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
     return Modes(shape, fit, scale, estimates, _described(shape, rows), limits, tuple(warnings))
@@ -227,6 +242,10 @@ def _described(shape: RationalShape, rows: list[Row]) -> str:
     """Write how the number of modes was chosen."""
     orders = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({orders})"
+
+
+WIDTHS_OF_CANCELLING = 1.0
+"""Distance of resonance and antiresonance, in half-widths, up to which they nearly cancel."""
 
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
@@ -239,7 +258,7 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
             continue
         zero = zeros[np.argmin(np.abs(zeros - pole))]
-        if abs(zero - pole) <= settings.widths_of_cancelling * min(-pole.real, abs(zero.real)):
+        if abs(zero - pole) <= WIDTHS_OF_CANCELLING * min(-pole.real, abs(zero.real)):
             yield (
                 f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
                 "cancel: an unevenness of the response looks like this, too, and may be no mode"
@@ -353,13 +372,21 @@ def simplest_model(rows: list[Row]) -> Row:
     return best
 
 
+CRITERION_OF_A_MODE = 10.0
+"""Decrease of the information criterion for another mode (Kass, Raftery 1995: very strong evidence)."""
+
+SQUARES_LEFT_BY_A_MODE = 0.8
+"""Largest ratio of the sums of squares with and without another mode. The criterion alone would fit friction's
+ripple."""
+
+
 def _better(larger: Row, smaller: Row) -> bool:
     """Tell whether a larger model beats a smaller one clearly.
 
     Its Bayesian criterion and its sum of squares must both be lower by more than the settings ask.
     """
-    lower = larger.bic < smaller.bic - settings.criterion_of_a_mode
-    return lower and larger.squares < settings.squares_left_by_a_mode * smaller.squares
+    lower = larger.bic < smaller.bic - CRITERION_OF_A_MODE
+    return lower and larger.squares < SQUARES_LEFT_BY_A_MODE * smaller.squares
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
@@ -412,14 +439,21 @@ def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return lower, upper
 
 
+FREQUENCIES_TRIED = 60
+"""Number of frequencies at which a further mode is tried."""
+
+DAMPINGS_TRIED = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Damping ratios at which a further mode is tried."""
+
+
 def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Add one more mode to the nonlinear parameters, where it improves the fit most."""
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
-    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), settings.frequencies_tried):
-        for damping in settings.dampings_tried:
+    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), FREQUENCIES_TRIED):
+        for damping in DAMPINGS_TRIED:
             start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
             left = _linear_parameters(_columns(start, shape, s), values, deviation)[1]
             if left @ left < best:
@@ -439,7 +473,7 @@ def _eliminated(
         return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
 
     lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
-    options: Any = {"bounds": (lower, upper), "ftol": settings.tolerance_of_a_fit, "max_nfev": 60}
+    options: Any = {"bounds": (lower, upper), "ftol": TOLERANCE_OF_A_FIT, "max_nfev": 60}
     return least_squares(left, np.clip(start, lower, upper), **options).x
 
 

@@ -20,7 +20,6 @@ from scipy.interpolate import CubicSpline
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
-from friso.identification.response.settings import settings
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,13 @@ class ResponseBand:
     magnitude_high: np.ndarray
     phase_low: np.ndarray
     phase_high: np.ndarray
+
+
+COHERENCE_OF_A_LINE = 0.5
+"""Smallest coherence of a spectral line that is used, if known."""
+
+LINES_OF_A_SCATTER = 15
+"""Number of lines from which the scatter between neighbours is computed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,13 +132,13 @@ class FrequencyResponse:
         """
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
-            enough &= self.coherence >= settings.coherence_of_a_line
+            enough &= self.coherence >= COHERENCE_OF_A_LINE
         if not enough.any():
             best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            coherence = f"a coherence of {settings.coherence_of_a_line:g}"
+            coherence = f"a coherence of {COHERENCE_OF_A_LINE:g}"
             expected = f"a response of {ratio:g} deviations and {coherence} on some line"
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
@@ -151,7 +157,7 @@ class FrequencyResponse:
         if len(size) < 3 or not np.all(size > 0):
             return self.deviation
         second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
-        width = min(settings.lines_of_a_scatter, len(second))
+        width = min(LINES_OF_A_SCATTER, len(second))
         medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
         places = np.arange(len(size)) - 1 - (width - 1) / 2
         rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # of normal deviations
@@ -212,15 +218,23 @@ def repetition(signal: np.ndarray) -> np.ndarray:
     return np.maximum(parts - 2 * correlation, 0.0) / ((n - lags) * 2 * squares[n] / n)
 
 
+AMPLITUDE_SWITCHED_OFF = 0.01
+"""Amplitude below which the end of an input counts as switched off, relative to the input's range."""
+
+
 def _switched_off(signal: np.ndarray) -> int:
     """Return the number of samples before an input is switched off.
 
     An input that is off at the end for 10 samples or fewer, or 0.5 % of the record, is not switched off: all samples
     count.
     """
-    moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
+    moving = np.flatnonzero(np.abs(signal - signal[-1]) > AMPLITUDE_SWITCHED_OFF * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
     return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
+
+
+CHANGE_BETWEEN_PERIODS = 0.2
+"""Largest change from one period to the next of an input that repeats, in twice the variance."""
 
 
 def _shortest(change: np.ndarray) -> int:
@@ -231,10 +245,17 @@ def _shortest(change: np.ndarray) -> int:
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))
-    if not lags.size or change[lags].min() > settings.change_between_periods:
+    if not lags.size or change[lags].min() > CHANGE_BETWEEN_PERIODS:
         raise _not_periodic("an input that does not repeat within half the record")
     good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
     return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
+
+
+CHANGE_OF_A_SLIP = 0.02
+"""Change between periods above which a slip of the generator's clock is searched, in twice the variance."""
+
+GROWTH_OF_A_SLIP = 2.0
+"""Smallest ratio of changes after two periods and after one that shows a slip of the clock, whose ratio is 4."""
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
@@ -246,8 +267,8 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
     here = change[inner]
-    lowest = (here <= change[inner - 1]) & (here <= change[inner + 1]) & (here < settings.change_of_a_slip)
-    return [int(lag) for lag in inner[lowest] if change[2 * lag] > settings.growth_of_a_slip * change[lag]]
+    lowest = (here <= change[inner - 1]) & (here <= change[inner + 1]) & (here < CHANGE_OF_A_SLIP)
+    return [int(lag) for lag in inner[lowest] if change[2 * lag] > GROWTH_OF_A_SLIP * change[lag]]
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
@@ -268,7 +289,7 @@ def _near(change: np.ndarray, expected: float) -> int:
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
     lags = np.arange(max(low, 2), min(high, len(change)))
     best = int(lags[np.argmin(change[lags])])
-    if change[best] > settings.change_between_periods:
+    if change[best] > CHANGE_BETWEEN_PERIODS:
         raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
     return best
 
@@ -381,6 +402,10 @@ class Spectra:
     warnings: tuple[str, ...] = ()
 
 
+SAMPLES_OF_A_SLIP = 0.05
+"""Slip of a generator's clock, in samples over the record, from which the record is resampled."""
+
+
 def spectra(record: ResponseRecord) -> Spectra:
     """Compute the spectra of a record over whole periods, without the transient.
 
@@ -393,7 +418,7 @@ def spectra(record: ResponseRecord) -> Spectra:
     driving = _harmonics(record.driving, periods)
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
-    if abs(slip) * periods.count > settings.samples_of_a_slip:
+    if abs(slip) * periods.count > SAMPLES_OF_A_SLIP:
         text = f"a period has {periods.samples + slip:.7g} samples, because the clocks differ"
         warnings = (*warnings, f"{text}: resampled to whole periods")
         record = _at_other_rate(record, 1 + slip / periods.samples)
@@ -481,6 +506,19 @@ def _same_excitation(driving: np.ndarray) -> np.ndarray:
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
 
 
+AMPLITUDE_OF_AN_EXCITED_LINE = 0.01
+"""Amplitude below which a line counts as not excited, relative to the strongest line (-40 dB)."""
+
+DEVIATIONS_OF_AN_EXCITED_LINE = 3.0
+"""Distance of an excited line from the noise, in standard deviations of its mean."""
+
+STEP_BETWEEN_LINES = 2.5
+"""Ratio of amplitudes that separates intended lines from unintended ones."""
+
+POWER_OF_MEANT_LINES = 0.95
+"""Smallest fraction of the power that intended lines must contain."""
+
+
 def _excited(driving: np.ndarray) -> np.ndarray:
     """Tell which lines the external signal excites intentionally, shape (lines,).
 
@@ -489,16 +527,20 @@ def _excited(driving: np.ndarray) -> np.ndarray:
     """
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
-    excited = mean > settings.amplitude_of_an_excited_line * mean.max()
-    excited &= mean > settings.deviations_of_an_excited_line * noise
+    excited = mean > AMPLITUDE_OF_AN_EXCITED_LINE * mean.max()
+    excited &= mean > DEVIATIONS_OF_AN_EXCITED_LINE * noise
     sizes = np.sort(mean[excited])[::-1]
     if sizes.size > 2:
         steps = sizes[:-1] / sizes[1:]
         cut = int(np.argmax(steps))
         share = np.sum(sizes[: cut + 1] ** 2) / np.sum(sizes**2)
-        if steps[cut] > settings.step_between_lines and share > settings.power_of_meant_lines:
+        if steps[cut] > STEP_BETWEEN_LINES and share > POWER_OF_MEANT_LINES:
             excited &= mean >= sizes[cut]
     return excited
+
+
+DISTANCE_OF_A_TRANSIENT = 1.5
+"""Smallest distance of a leading period from the others that makes it a transient, in their variance."""
 
 
 def _transient_periods(reaction: np.ndarray) -> int:
@@ -513,7 +555,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
         return 0
     later = np.arange(count - last, count)
     off = np.array([_distance(reaction[number], reaction[later[later != number]]) for number in range(count)])
-    return int(np.flatnonzero(off <= settings.distance_of_a_transient * off[later].max())[0])
+    return int(np.flatnonzero(off <= DISTANCE_OF_A_TRANSIENT * off[later].max())[0])
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:
@@ -583,6 +625,13 @@ def multisine(records: Sequence[ResponseRecord], channels: Channels | None = Non
     )
 
 
+PERIOD_TOLERANCE = 1e-3
+"""Largest relative difference between the periods of realisations."""
+
+TOLERANCE_OF_EQUAL_PERIODS = 1e-6
+"""Relative difference below which periods count as equal."""
+
+
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     """Bring the spectra of realisations to common frequencies; also return remarks on clocks.
 
@@ -593,11 +642,11 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     spacings = np.array([realisation.frequency[0] for realisation in records])
     apart = float(np.ptp(spacings) / spacings.min())
     counts = np.array([len(realisation.frequency) for realisation in records])
-    if apart > settings.period_tolerance or np.ptp(counts) > 1 + settings.period_tolerance * counts.min():
+    if apart > PERIOD_TOLERANCE or np.ptp(counts) > 1 + PERIOD_TOLERANCE * counts.min():
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     records = [_first_lines(realisation, int(counts.min())) for realisation in records]
-    if apart <= settings.tolerance_of_equal_periods:
+    if apart <= TOLERANCE_OF_EQUAL_PERIODS:
         return records, []
     mean = float(spacings.mean())
     lines = np.arange(1, counts.min() + 1) * mean
@@ -638,6 +687,13 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
     return outputs, inputs
 
 
+FREEDOM_OF_A_VARIANCE = 10
+"""Degrees of freedom from which a spectral line's own variance is used."""
+
+LINES_SHARING_VARIANCE = 5
+"""Number of neighbouring lines that share their variance if there are few realisations."""
+
+
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the deviation of the mean response over realisations, and its degrees of freedom.
 
@@ -648,7 +704,7 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
     relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
     freedom = 2 * (count - 1)
-    width = 1 if freedom >= settings.freedom_of_a_variance else min(settings.lines_sharing_variance, len(relative))
+    width = 1 if freedom >= FREEDOM_OF_A_VARIANCE else min(LINES_SHARING_VARIANCE, len(relative))
     window = np.ones(width)
     shared = np.convolve(np.ones(len(relative)), window, "same")
     relative = np.convolve(relative, window, "same") / shared
@@ -668,9 +724,19 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
     left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
     power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
-    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES_SHARING_VARIANCE]
     local = np.maximum(power[near].mean(axis=0), 0.0)
     return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])
+
+
+LINES_ON_A_SIDE = 8
+"""Number of lines on each side in a local fit: 17 complex equations for 6 unknowns."""
+
+AMPLITUDE_OF_A_WEAK_LINE = 1e-4
+"""Amplitude below which a line counts as not excited, relative to the largest (-80 dB)."""
+
+ORDER_OF_LOCAL_POLYNOMIALS = 2
+"""Order of the local polynomials of response and transient."""
 
 
 def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
@@ -682,7 +748,7 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     requires: the response is the ratio of the responses of output and input to the reference. Raises InputError for a
     record of fewer than 200 samples.
     """
-    record, side = record.checked(200), settings.lines_on_a_side
+    record, side = record.checked(200), LINES_ON_A_SIDE
     size = len(record.driving)
     driving, excitation, answer = (
         np.fft.rfft(channel - channel.mean()) / size for channel in (record.driving, record.input, record.output)
@@ -690,10 +756,10 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     centres = np.arange(1 + side, len(driving) - side - 1, side + 1)
     around = np.arange(-side, side + 1)
     strength = np.sqrt(np.mean(np.abs(driving[centres[:, None] + around]) ** 2, axis=1))
-    strong = strength > settings.amplitude_of_a_weak_line * strength.max()
+    strong = strength > AMPLITUDE_OF_A_WEAK_LINE * strength.max()
     centres, scale = centres[strong], strength[strong]
     window = centres[:, None] + around
-    powers = (around / side)[:, None] ** np.arange(settings.order_of_local_polynomials + 1)
+    powers = (around / side)[:, None] ** np.arange(ORDER_OF_LOCAL_POLYNOMIALS + 1)
     regressors = driving[window][:, :, None] * powers / scale[:, None, None]
     transient = np.broadcast_to(powers, (len(centres), *powers.shape))
     columns = np.concatenate([regressors, transient], axis=2)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.logs.settings import settings
+from friso.identification.logs.signals import LARGEST_VALUE
 from friso.identification.sources import ChannelContent, LogContent
 from friso.platform.system import shell_word
 from friso.shown.blocks import AnswerBlock
@@ -228,7 +228,7 @@ def _panel(channel: ChannelContent) -> Panel:
     role = channel.role.replace("_", " ")
     words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
-        words += f" (values beyond {settings.largest_value:g} not drawn)"
+        words += f" (values beyond {LARGEST_VALUE:g} not drawn)"
     finite = values[np.isfinite(values)]
     level, limits = float(np.median(finite)) if finite.size else 0.0, None
     if finite.size and np.ptp(finite) <= 1e-12 * abs(level):
@@ -245,7 +245,7 @@ def _within_range(values: np.ndarray) -> np.ndarray:
     The limit is the setting `largest_value`. Values smaller than its inverse become 0.
     """
     sizes = np.abs(values)
-    return np.where(sizes <= settings.largest_value, np.where(sizes < 1 / settings.largest_value, 0.0, values), np.nan)
+    return np.where(sizes <= LARGEST_VALUE, np.where(sizes < 1 / LARGEST_VALUE, 0.0, values), np.nan)
 
 
 def blocks(contents: Sequence[LogContent]) -> list[AnswerBlock]:

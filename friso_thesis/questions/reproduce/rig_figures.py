@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from friso.identification.settings import experiment_settings
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.figure import (
     BLUE,
@@ -24,6 +23,7 @@ from friso.shown.drawing.figure import (
     Series,
     phases,
 )
+from friso_thesis.studies.identification.steps import LOW_PASS_OF_STEPS
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
     GRID,
@@ -137,7 +137,7 @@ def _steps(experiments: Experiments) -> dict[str, Figure]:
     )
     force = (
         Series(log.time, log["force"], "force", VERMILLION, width=0.8),
-        Series(read.time, read.force, f"low-passed at {experiment_settings.low_pass_of_steps:g} Hz", INK),
+        Series(read.time, read.force, f"low-passed at {LOW_PASS_OF_STEPS:g} Hz", INK),
     )
     panels = Panel("", _TIME, Axis("Position", "m"), place), Panel("", _TIME, Axis("Force", "N"), force)
     caption = "Steps of 0.3 mm of the simulated rig, its cart fixed: the position is the deflection of the joint."

@@ -19,10 +19,19 @@ from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import AREA, TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, block_mean, by_segment, by_t, cart, channel, deflection, low_pass
+from friso.identification.readings.common import (
+    BLOCKS_OF_A_MEAN,
+    Mean,
+    block_mean,
+    by_segment,
+    by_t,
+    cart,
+    channel,
+    deflection,
+    low_pass,
+)
 from friso.identification.readings.course import Course
-from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import experiment_settings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.stage import Stage
@@ -72,6 +81,10 @@ class StepStiffness:
     warnings: tuple[str, ...]
 
 
+LOW_PASS_OF_STEPS = 25.0  # [Hz]
+"""Low-pass of the force of position steps (thesis, Sec. 4.2.2)."""
+
+
 def stiffness_from_steps(log: Log) -> StepStiffness:
     """Estimate the joint's stiffness from position steps with the cart fixed.
 
@@ -82,7 +95,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)
     deflected = position if measured is None else measured
-    cutoff = experiment_settings.low_pass_of_steps
+    cutoff = LOW_PASS_OF_STEPS
     smooth = [by_segment(log, values, low_pass, cutoff) for values in (force, deflected)]
     spans = [span for part in log.segments for span in _plateaus(log, part, cutoff)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
@@ -144,6 +157,13 @@ def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> floa
     return float(np.polyfit(levels[:, 0], levels[:, 1], 1)[0])
 
 
+DRIFT_OF_A_SETTLED_FORCE = 0.02
+"""Largest drift of the force in a settled window beyond the deflection's share, relative to a step."""
+
+DRIFT_OF_A_SETTLED_PLACE = 0.1
+"""Largest drift of the deflection in a settled window if no window drifts less, relative to a step."""
+
+
 def _settled_window(
     log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
 ) -> Window | None:
@@ -154,12 +174,12 @@ def _settled_window(
     rough stiffness.
     """
     length = span.stop - span.start
-    margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
+    margin = min(length // 10, int(1 / (LOW_PASS_OF_STEPS * log.sample_time)))
     range_of_force = float(np.subtract(*np.percentile(force, [95, 5])))
-    limits = experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place
+    limits = DRIFT_OF_A_SETTLED_FORCE, DRIFT_OF_A_SETTLED_PLACE
     for allowed, share in product(limits, SETTLED_SHARES):
         chosen = slice(span.start + int(share * length), span.stop - margin)
-        if chosen.stop - chosen.start < 2 * reading_settings.blocks_of_a_mean:
+        if chosen.stop - chosen.start < 2 * BLOCKS_OF_A_MEAN:
             continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
@@ -202,7 +222,7 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    linear = reading_settings.linearity_of_sensors * abs(slope)
+    linear = LINEARITY_OF_SENSORS * abs(slope)
     return by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear).if_positive(SOFT)
 
 
@@ -224,6 +244,10 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
     return by_t(name, unit, Mean(float(solution[2]), float(variance**0.5), len(x) - 3), method)
 
 
+TRAVEL_OF_A_FIXED_CART = 0.02
+"""Largest motion of a fixed cart, relative to the position's steps."""
+
+
 def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
     """Tell whether the cart stood still between the windows, with notes.
 
@@ -236,7 +260,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
         return None, ()
     marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
     followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
-    if followed <= experiment_settings.travel_of_a_fixed_cart * went:
+    if followed <= TRAVEL_OF_A_FIXED_CART * went:
         return True, ()
     finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)

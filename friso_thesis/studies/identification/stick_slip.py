@@ -30,9 +30,8 @@ from friso.identification.readings.common import (
     rate,
     solve_normal_equations,
 )
-from friso.identification.readings.motion_events import Slip, slips, static_friction
-from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import experiment_settings
+from friso.identification.readings.friction_velocity import LINEARITY_OF_SENSORS
+from friso.identification.readings.motion_events import SPEED_SHARE_OF_AN_ONSET, Slip, slips, static_friction
 from friso.intervals import NORMAL_COVERAGE
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
@@ -80,6 +79,13 @@ class StickSlip:
     warnings: tuple[str, ...]
 
 
+LOW_PASS_OF_STICK_SLIP = 100.0  # [Hz]
+"""Low-pass of deflection and velocity in stick-slip motion, faster than any slip."""
+
+STROKE_SHARE_AT_A_STOP = 0.05
+"""Distance from the stroke at which the limiter counts as touched, relative to the stroke."""
+
+
 def static_from_stick_slip(
     log: Log, stiffness: Estimate | float | None = None, stage_mass: float = 0.0, stroke: float = np.inf
 ) -> StickSlip:
@@ -91,7 +97,7 @@ def static_from_stick_slip(
     `stroke` [m] of the joint do not count. Quantities that the record cannot show are unknown, with the reason. Raises
     InputError for missing channels or an unusable stiffness.
     """
-    cutoff, measured = experiment_settings.low_pass_of_stick_slip, deflection(log)
+    cutoff, measured = LOW_PASS_OF_STICK_SLIP, deflection(log)
     deflected = None if measured is None else by_segment(log, measured, low_pass, cutoff)
     pull, relative_error = _pull(log, stiffness, deflected, _actuator(log, stage_mass, cutoff))
     body = on_bearing(log)
@@ -110,7 +116,7 @@ def static_from_stick_slip(
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
             late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
             place = (float(log.time[at]), float(body[at]), float(direction))
-            held = held or abs(bent) > (1 - experiment_settings.stroke_share_at_a_stop) * stroke
+            held = held or abs(bent) > (1 - STROKE_SHARE_AT_A_STOP) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
@@ -164,6 +170,10 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
     return stiffness_of_loading(deflected, bending, _acceleration(log, cutoff), pushed, loads)
 
 
+FEWEST_LOADS = 3
+"""Fewest loads of a joint between slips. Fewer give no error of the stiffness."""
+
+
 def stiffness_of_loading(
     deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
 ) -> Estimate:
@@ -177,8 +187,8 @@ def stiffness_of_loading(
     stiffness is unknown.
     """
     count = len(loads)
-    if count < reading_settings.fewest_loads:
-        return Estimate.unknown(*LOADED, f"{count} loads between slips: {reading_settings.fewest_loads} are needed")
+    if count < FEWEST_LOADS:
+        return Estimate.unknown(*LOADED, f"{count} loads between slips: {FEWEST_LOADS} are needed")
     signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
     products = np.array([x @ x.T for x in signals])
     if not products[:, 0, 0].sum() > 0:
@@ -186,7 +196,7 @@ def stiffness_of_loading(
     without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
-    linear, (key, unit, method) = reading_settings.linearity_of_sensors * abs(value), LOADED
+    linear, (key, unit, method) = LINEARITY_OF_SENSORS * abs(value), LOADED
     estimate = by_t(key, unit, Mean(value, error, count - 1), method, linear, linear)
     return estimate.if_positive("more deflection does not need more force")
 
@@ -197,6 +207,13 @@ def _spring(products: np.ndarray) -> float:
     `products`, shape (signals, signals), are the scalar products of the signals.
     """
     return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])
+
+
+SHARE_NEAR_A_PEAK = 0.01
+"""Distance below its peak within which the force counts as near the peak, relative to the peak."""
+
+DURATION_NEAR_A_PEAK = 4.0
+"""Time near the peak above which a force had stopped rising, relative to the usual time."""
 
 
 def _peak(pull: np.ndarray, sample_time: float, cutoff: float, slip: Slip) -> tuple[int, float, float, float, bool]:
@@ -214,7 +231,7 @@ def _peak(pull: np.ndarray, sample_time: float, cutoff: float, slip: Slip) -> tu
     rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
     tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
     usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
-    share, times = experiment_settings.share_near_a_peak, experiment_settings.duration_near_a_peak
+    share, times = SHARE_NEAR_A_PEAK, DURATION_NEAR_A_PEAK
     near = float((pull[rest : at + 1] > (1 - share) * pull[at]).sum()) * sample_time
     held = not usual > 0 or near > times * (share * abs(pull[at] / usual) + 1 / cutoff)
     return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
@@ -227,17 +244,25 @@ def _unseen(speed: np.ndarray) -> float:
     times, as in its first visible doubling. An evenly accelerating body would be hidden for less.
     """
     first, top = float(speed[0]), float(speed[-1])
-    if not first > reading_settings.speed_share_of_an_onset * top:
+    if not first > SPEED_SHARE_OF_AN_ONSET * top:
         return 0.0
     doubled = int(np.argmax(speed >= min(2 * first, top)))
-    return doubled * float(np.log2(first / (reading_settings.speed_share_of_an_onset * top)))
+    return doubled * float(np.log2(first / (SPEED_SHARE_OF_AN_ONSET * top)))
+
+
+TIME_SHARE_OF_SLIDING = 0.6
+"""Fraction of time above the slip threshold beyond which a body slides rather than sticks and slips."""
 
 
 def _why(shares: list[float]) -> str:
     """Return why a log has no slips, from the fractions of time spent sliding."""
-    if shares and min(shares) > reading_settings.time_share_of_sliding:
+    if shares and min(shares) > TIME_SHARE_OF_SLIDING:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
+
+
+SHARE_OF_HELD_SLIPS = 0.5
+"""Fraction of slips without a rising force above which the log does not show static friction."""
 
 
 def _answer(
@@ -253,7 +278,7 @@ def _answer(
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
-        if held[chosen].mean() > experiment_settings.share_of_held_slips:
+        if held[chosen].mean() > SHARE_OF_HELD_SLIPS:
             low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * NORMAL_COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # ranges of held mean values may be missing
@@ -348,12 +373,16 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     return Estimate(name, "N", middle, middle - half, middle + half, method)
 
 
+STIFFNESS_SHARE_OF_A_LIMITER = 0.1
+"""Largest stiffness of a joint, relative to its limiter's stiffness."""
+
+
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Tell whether a stiffness is the joint's, not that of a limiter that holds it."""
     if stage is None or stage.joint is None or not stiffness.determined:
         return False
     limiter = stage.flat()["joint.limiter_stiffness"]
-    return bool(stiffness.value < experiment_settings.stiffness_share_of_a_limiter * limiter)
+    return bool(stiffness.value < STIFFNESS_SHARE_OF_A_LIMITER * limiter)
 
 
 def _broken(values: np.ndarray, log: Log) -> np.ndarray:

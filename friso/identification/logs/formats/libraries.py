@@ -25,7 +25,6 @@ from friso.identification.logs.read import (
     is_workbook,
     members,
 )
-from friso.identification.logs.settings import settings
 from friso.identification.logs.sniff import NumberFormat, layout
 from friso.identification.logs.text import column_values, read_text, with_times
 from friso.identification.logs.units import split_heading, unit_since_1970
@@ -178,6 +177,10 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
     return out
 
 
+SHARE_OF_A_STATED_STEP = 0.01
+"""Largest difference of a header's time step from that of its time column, relative to it."""
+
+
 def _contradictions(channel: Channel, stated: float | None, step: float | None) -> list[str]:
     """Write where the columns contradict the number of samples and the time step [s] that the header states."""
     notes, count = [], channel.values.size
@@ -186,7 +189,7 @@ def _contradictions(channel: Channel, stated: float | None, step: float | None) 
             f"contradiction: {channel.name} has {count} samples, and its header says {stated:.15g}: all are read"
         )
     own = float(np.median(np.diff(channel.time))) if channel.time is not None and count > 1 else None
-    if step and own and abs(step - own) > settings.share_of_a_stated_step * abs(own):
+    if step and own and abs(step - own) > SHARE_OF_A_STATED_STEP * abs(own):
         notes.append(f"contradiction: Delta_X is {step:.6g} s, the time column rises by {own:.6g} s: the column counts")
     return notes
 

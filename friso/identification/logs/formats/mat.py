@@ -12,7 +12,6 @@ from friso.errors import LogError
 from friso.identification.logs.binary import OBJECT, is_hdf5
 from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.read import FileHead, LogFormat, content, content_by
-from friso.identification.logs.settings import settings
 from friso.identification.logs.units import split_heading
 
 
@@ -79,6 +78,10 @@ def _walk(node: Any, name: str, walk: _Contents, unit: str = "") -> None:
         walk.notes.append(f"left out: {name}, complex numbers")
 
 
+COLUMNS_OF_A_MATRIX = 64
+"""Largest number of columns of a matrix that is read as channels. Larger ones are images or response matrices."""
+
+
 def _array(values: np.ndarray, name: str, walk: _Contents, unit: str) -> None:
     """Add an array to the contents: as one number, one channel, or one channel per column.
 
@@ -91,7 +94,7 @@ def _array(values: np.ndarray, name: str, walk: _Contents, unit: str) -> None:
         walk.scalars[name] = float(values)
     elif values.ndim == 1 and values.size > 1:
         walk.channels.append(Channel(name, unit, values.astype(float), None, name))
-    elif values.ndim == 2 and min(values.shape) <= settings.columns_of_a_matrix:
+    elif values.ndim == 2 and min(values.shape) <= COLUMNS_OF_A_MATRIX:
         for i, column in enumerate(values.T if values.shape[0] >= values.shape[1] else values):
             label = f"{name}(:,{i + 1})" if values.shape[0] >= values.shape[1] else f"{name}({i + 1},:)"
             walk.channels.append(Channel(label, unit, column.astype(float), None, label))
