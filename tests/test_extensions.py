@@ -202,6 +202,8 @@ from friso.interface.question import HUNTS, Question
 QUESTION = Question(__name__, 25, HUNTS, "hold rig.toml --force-limit '3 N'", details=True)
 """,
     "question": """
+from __future__ import annotations
+
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, ForceLike, StageLike, quantity_of, read_stage
 from friso.progress import Progress, silent

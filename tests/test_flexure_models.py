@@ -242,11 +242,11 @@ def test_modes_of_stage_and_leaves(springs: Mechanism) -> None:
     stiffness = block_diag(closed_forms.stage_stiffness(springs), (2 * np.pi * closed_forms.leaf_bending(springs)) ** 2)
     frequencies, shapes = closed_forms.modes(springs)
     squares = eigh(stiffness, mass, eigvals_only=True)
-    assert frequencies == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-5)
-    assert np.allclose(shapes.T @ mass @ shapes, np.eye(7), atol=1e-4)  # constants of five digits
+    assert frequencies == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-9)
+    assert np.allclose(shapes.T @ mass @ shapes, np.eye(7), atol=1e-9)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
     compliances = (shapes[2] / (2 * np.pi * frequencies)) ** 2
-    assert np.linalg.inv(stiffness)[2, 2] == pytest.approx(np.sum(compliances), rel=1e-4)
+    assert np.linalg.inv(stiffness)[2, 2] == pytest.approx(np.sum(compliances), rel=1e-9)
     assert compliances[drive] > 0.5 * np.sum(compliances)
 
 

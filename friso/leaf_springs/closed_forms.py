@@ -29,7 +29,7 @@ SHEAR_COEFFICIENT = 5 / 6
 CLAMPED_ROOT = 4.730040744862704
 """First root of cos x cosh x = 1: a beam between clamps."""
 
-WITH_STAGE, WITH_TURN = 0.41543, 0.08939
+WITH_STAGE, WITH_TURN = 0.41543076162434, 0.08939232481715
 """Mean over a leaf of its first bending mode, which has mean square 1, times a static shape of the leaf: the shape when
 the stage moves along the motion, and the shape when it turns about the width (per length of the leaf)."""
 

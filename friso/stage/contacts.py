@@ -143,7 +143,7 @@ def _guessed(ends: ContactRange, unit: str) -> UncertainValue:
     return UncertainValue(interval.middle, UNKNOWN, interval)
 
 
-class GuessedStage(Protocol):
+class _GuessedStage(Protocol):
     """What guesses need of a stage: its axis, its keys, and those that nobody knows."""
 
     @property
@@ -156,7 +156,7 @@ class GuessedStage(Protocol):
     def uncertain(self) -> dict[str, Interval]: ...
 
 
-def followed(stage: GuessedStage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+def followed(stage: _GuessedStage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
     """Return the guessed keys of a stage that follow a swept one, each with that key and its values [SI].
 
     `swept` has SI numbers or arrays by key. Values follow from Coulomb friction, or from static friction where that
@@ -179,7 +179,7 @@ def followed(stage: GuessedStage, swept: Mapping[str, Any]) -> dict[str, tuple[s
 
 
 def usual_ranges(
-    stage: GuessedStage, keys: Collection[str], bounds: Mapping[str, ContactRange]
+    stage: _GuessedStage, keys: Collection[str], bounds: Mapping[str, ContactRange]
 ) -> dict[str, ContactRange]:
     """Return what similar machines have for some keys of [friction] that nobody knows, as ranges [SI] by key.
 
@@ -204,7 +204,7 @@ def usual_ranges(
     return {key: cut(ranges[key], bounds.get(key, ranges[key])) for key in keys if key in ranges and key in flat}
 
 
-def guessed_ratios(stage: GuessedStage) -> dict[str, tuple[str, Interval]]:
+def guessed_ratios(stage: _GuessedStage) -> dict[str, tuple[str, Interval]]:
     """Return, for keys of [friction] that grow with another one over machines, that key and the range of their ratio.
 
     They are static friction with Coulomb friction, and the damping of bristles with their stiffness. Both keys must be
@@ -224,7 +224,7 @@ def guessed_ratios(stage: GuessedStage) -> dict[str, tuple[str, Interval]]:
     return found
 
 
-def _contact_of(stage: GuessedStage, table: str = "friction") -> ContactKind:
+def _contact_of(stage: _GuessedStage, table: str = "friction") -> ContactKind:
     """Return the contact that the guess in a `table` of a stage names, or any contact."""
     guess = getattr(getattr(stage, table), "guess", None)
     return _understood(guess, stage.axis_kind)[0] if guess else any_contact(stage.axis_kind)
