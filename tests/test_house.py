@@ -156,3 +156,12 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     sorter = TopologicalSorter({name: graph.find_modules_directly_imported_by(name) for name in graph.modules})
     sorter.prepare()  # raises CycleError
     assert sorter.is_active()
+
+
+def test_every_command_has_a_price_and_every_feature_begins_somewhere() -> None:
+    from benchmarks import price
+    from friso.cli.app import COMMANDS
+
+    places = [place.partition(":") for those in price.features().values() for place in those]
+    assert [name for name, _, own in places if own not in {"", *price.modules()[name].definitions}] == []
+    assert {f"command {name}" for name in COMMANDS} <= {*price.features()}
