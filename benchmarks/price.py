@@ -3,8 +3,8 @@
 `benchmarks/features.toml` names each feature with the definitions, or modules, in which it begins. Its price is the
 code that nothing reaches any more once these are taken out: functions, classes and constants of modules, followed by
 the names in their text. A text that names a module reaches all of it, as registries do; a package, all modules in it.
-What nothing is seen to reach counts as reached from outside. A landing that makes a feature more than 5 % dearer says in its
-message what users get for it.
+What nothing is seen to reach counts as reached from outside. A landing that makes a feature more than 5 % dearer says
+in its message what users get for it.
 """
 
 import argparse
