@@ -23,7 +23,7 @@ from friso.hunting import (
 )
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.return_map.attracting import survey_maps
-from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.return_map.landing_map import LandingMap, attractors_of
 from friso.hunting.return_map.landings import Landings
 from friso.hunting.what_attracts import map_may_decide, resolved_map, what_attracts
 from friso.stage import Stage
@@ -102,6 +102,15 @@ def test_beyond_a_flip_landings_alternate() -> None:
         (attractor,) = of_function(DISTANCES * np.exp(r - r * DISTANCES)).attractors
         swings[r] = len(attractor.distances) if attractor.periodic else 0
     assert swings == {1.9: 1, 2.3: 2, 2.6: 4, 2.9: 0}
+
+
+def test_maps_of_many_stages_lead_where_each_leads_alone() -> None:
+    """Also irregular motions, which a shift of coordinates would change."""
+    maps = [of_function(DISTANCES * np.exp(r - r * DISTANCES)) for r in np.linspace(1.5, 3.2, 40)]
+    for one, found in zip(maps, attractors_of(maps), strict=True):
+        for alone, together in zip(one.attractors, found, strict=True):
+            assert np.array_equal(alone.distances, together.distances)
+            assert np.array_equal(alone.basin, together.basin)
 
 
 def test_a_map_whose_returns_lie_in_a_narrower_range_than_its_points_is_not_at_rest() -> None:

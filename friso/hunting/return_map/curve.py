@@ -7,7 +7,9 @@ Coordinates are logarithms of distance (see `friso.hunting.return_map.landing_ma
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,31 +23,47 @@ TERMS = 4
 """Coefficients of a cubic."""
 
 
+STAGE_SHIFT = 4 * NEGATIVE_SIDE_SHIFT
+"""Shift from one stage to the next on the line of several maps, which leaves room for both sides of each."""
+
+
 @dataclass(frozen=True)
 class Cubics:
     """Cubics side by side: where each begins, ascending, and its coefficients by power, (4, cubics).
 
-    A cubic is one of the distance from its beginning.
+    A cubic is one of the distance from its beginning. The maps of several stages follow each other: `stages` has the
+    number of each cubic's stage.
     """
 
     begins: np.ndarray
     terms: np.ndarray
+    stages: np.ndarray | int = 0
 
-    def __call__(self, places: np.ndarray) -> np.ndarray:
-        """Return the values at `places`, both (count,)."""
-        number = self._numbers(places)
+    def __call__(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
+        """Return the values at `places` of the numbered stages, all (count,)."""
+        number = self._numbers(places, stages)
         apart, (value, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
         return value + apart * (slope + apart * (bend + apart * twist))
 
-    def slope(self, places: np.ndarray) -> np.ndarray:
-        """Return the slopes at `places`, both (count,)."""
-        number = self._numbers(places)
+    def slope(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
+        """Return the slopes at `places` of the numbered stages, all (count,)."""
+        number = self._numbers(places, stages)
         apart, (_, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
         return slope + apart * (2 * bend + apart * 3 * twist)
 
-    def _numbers(self, places: np.ndarray) -> np.ndarray:
-        """Return the numbers of the cubics at `places`, both (count,)."""
-        return self.begins.searchsorted(places, side="right") - 1
+    @cached_property
+    def _line(self) -> np.ndarray:
+        """Return where the cubics begin on the line of all stages."""
+        return _on_line(self.begins, self.stages)
+
+    def _numbers(self, places: np.ndarray, stages: np.ndarray | int) -> np.ndarray:
+        """Return the numbers of the cubics at `places` of the numbered stages, all (count,)."""
+        return self._line.searchsorted(_on_line(places, stages), side="right") - 1
+
+
+def _on_line(places: np.ndarray, stages: np.ndarray | int) -> np.ndarray:
+    """Return where coordinates of the numbered stages lie on the line of all stages."""
+    return np.clip(places, -STAGE_SHIFT / 2, STAGE_SHIFT / 2) + STAGE_SHIFT * np.asarray(stages)
 
 
 def at_rest(begin: float) -> Cubics:
@@ -78,9 +96,14 @@ def curve(places: np.ndarray, after: np.ndarray, inward: bool) -> Cubics:
     return join(parts)
 
 
-def join(parts: list[Cubics]) -> Cubics:
+def join(parts: Sequence[Cubics]) -> Cubics:
     """Return curves side by side as one."""
     return Cubics(np.concatenate([part.begins for part in parts]), np.hstack([part.terms for part in parts]))
+
+
+def side_by_side(curves: Sequence[Cubics]) -> Cubics:
+    """Return the curves of several stages as one."""
+    return replace(join(curves), stages=np.repeat(np.arange(len(curves)), [len(one.begins) for one in curves]))
 
 
 def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Cubics:

@@ -1,36 +1,16 @@
-"""Iterate return maps to where they lead: those of many stages together, side by side on one line.
+"""Iterate return maps to where they lead, those of many stages together.
 
-Coordinates are logarithms of distance, shifted on the negative side (see `friso.hunting.return_map.landing_map`), and
-from stage to stage.
+Coordinates are logarithms of distance, shifted on the negative side (see `friso.hunting.return_map.landing_map`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friso.hunting.attractors.rounds import LEAST_SWING, MOST_REPEATING_SWINGS
-from friso.hunting.return_map.curve import FIRST_COORDINATE, NEGATIVE_SIDE_SHIFT, REST_COORDINATE, Cubics, at_rest, join
-
-STAGE_SHIFT = 4 * NEGATIVE_SIDE_SHIFT
-"""Shift of coordinates from one stage to the next, which leaves room for both sides of each."""
-
-
-def beside(places: np.ndarray, stages: int) -> np.ndarray:
-    """Return coordinates shifted by a number of stages; those of rest stay."""
-    return np.where(places > REST_COORDINATE, places + STAGE_SHIFT * stages, REST_COORDINATE)
-
-
-def side_by_side(curves: Sequence[Cubics]) -> Cubics:
-    """Return the curves of several maps as one, that of stage k shifted by k stages."""
-    parts = [at_rest(FIRST_COORDINATE)]
-    for k, one in enumerate(curves):
-        begins = np.clip(one.begins, -STAGE_SHIFT / 2, STAGE_SHIFT / 2) + STAGE_SHIFT * k
-        parts.append(Cubics(begins, np.vstack([beside(one.terms[0], k), one.terms[1:]])))
-    return join(parts)
-
+from friso.hunting.return_map.curve import NEGATIVE_SIDE_SHIFT, REST_COORDINATE, Cubics
 
 MOST_PASSED_LANDINGS = 40  # [landings]
 """Most landings that are passed over at once. Over more, the slope of the map changes."""
@@ -57,35 +37,35 @@ SAME_ATTRACTOR_SHARE = 0.02
 
 @dataclass(frozen=True)
 class MapLine:
-    """Return map of one stage, or of several side by side, as a function of coordinates."""
+    """Return map of one stage, or of several that are numbered, as a function of coordinates."""
 
     curve: Cubics
 
-    def next(self, places: np.ndarray) -> np.ndarray:
-        """Return the coordinates of the landings that follow landings at `places`, both (count,)."""
-        after = self.curve(places)
+    def next(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
+        """Return the coordinates of the landings that follow landings at `places` of the numbered stages, (count,)."""
+        after = self.curve(places, stages)
         distance = after - NEGATIVE_SIDE_SHIFT * np.rint(after / NEGATIVE_SIDE_SHIFT)
         after[distance < np.log(LEAST_SWING)] = REST_COORDINATE
         return after
 
-    def _moved_on(self, at: np.ndarray) -> np.ndarray:
+    def _moved_on(self, at: np.ndarray, stages: np.ndarray) -> np.ndarray:
         """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
 
         Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
         x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in the most
         landings that may be passed over.
         """
-        after = self.next(at)
-        slope = self.curve.slope(at) * self.curve.slope(after)
-        step = self.next(after) - at
+        after = self.next(at, stages)
+        slope = self.curve.slope(at, stages) * self.curve.slope(after, stages)
+        step = self.next(after, stages) - at
         with np.errstate(all="ignore"):
             times = np.minimum(0.5 / np.abs(1 - slope), MOST_PASSED_LANDINGS / 2)
         return np.where((times > 1) & (at > REST_COORDINATE) & (np.abs(step) < SLOW_MOVE_LOG), at + times * step, at)
 
-    def followed(self, at: np.ndarray) -> np.ndarray:
-        """Iterate the map from coordinates until they are on attractors; return their last landings.
+    def followed(self, at: np.ndarray, stages: np.ndarray) -> np.ndarray:
+        """Iterate the maps of numbered stages from coordinates, both (points,), until they are on attractors.
 
-        The result holds coordinates, shape (points, landings).
+        Returns their last landings: coordinates, shape (points, landings).
         """
         landings = 2 * MOST_REPEATING_SWINGS + 1
         paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
@@ -99,10 +79,10 @@ class MapLine:
                     left, at = left[goes], at[goes]
                     if not left.size:
                         return paths
-                    at = self._moved_on(at)
-                at = self.next(at)
+                    at = self._moved_on(at, stages[left])
+                at = self.next(at, stages[left])
             for k in range(landings):
-                paths[left, k], at = at, self.next(at)
+                paths[left, k], at = at, self.next(at, stages[left])
             strays = _strays(paths[left])
             slow = strays > ARRIVED_SHARE
             if iterations in MAP_ITERATIONS:

@@ -25,8 +25,9 @@ from friso.hunting.return_map.curve import (
     fitted,
     join,
     piece_about,
+    side_by_side,
 )
-from friso.hunting.return_map.iterated import SAME_ATTRACTOR_SHARE, MapLine, beside, repeats_after, side_by_side
+from friso.hunting.return_map.iterated import SAME_ATTRACTOR_SHARE, MapLine, repeats_after
 from friso.hunting.return_map.landings import Landings
 
 BISECTIONS = 40
@@ -219,7 +220,8 @@ class LandingMap:
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
         """Return which landings, as signed distances, lead to swinging for ever, (count,)."""
-        return np.all(self._line.followed(self._places(distances)) > REST_COORDINATE, axis=1)
+        at = self._places(distances)
+        return np.all(self._line.followed(at, np.zeros(len(at), np.int64)) > REST_COORDINATE, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
@@ -281,11 +283,13 @@ class LandingMap:
 
 def attractors_of(maps: Sequence[LandingMap]) -> list[tuple[MapAttractor, ...]]:
     """Return the attractors of each of several maps, which are iterated together from their points."""
+    counts = [one.after.size for one in maps]
+    starts = np.concatenate([one._places(one.after) for one in maps])
     paths = MapLine(side_by_side([one._curve for one in maps])).followed(
-        np.concatenate([beside(one._places(one.after), k) for k, one in enumerate(maps)])
+        starts, np.repeat(np.arange(len(maps)), counts)
     )
-    parts = np.split(paths, np.cumsum([one.after.size for one in maps[:-1]]))
-    return [tuple(one._told_apart(beside(part, -k))) for k, (one, part) in enumerate(zip(maps, parts, strict=True))]
+    parts = np.split(paths, np.cumsum(counts[:-1]))
+    return [tuple(one._told_apart(part)) for one, part in zip(maps, parts, strict=True)]
 
 
 def _place(distances: np.ndarray) -> np.ndarray:
