@@ -31,39 +31,39 @@ STAGE_SHIFT = 4 * NEGATIVE_SIDE_SHIFT
 class Cubics:
     """Cubics side by side: where each begins, ascending, and its coefficients by power, (4, cubics).
 
-    A cubic is one of the distance from its beginning. The maps of several stages follow each other: `stages` has the
-    number of each cubic's stage.
+    A cubic is one of the distance from its beginning. The maps of several stages follow each other on one line, on
+    which `shifts` says where each cubic's stage lies.
     """
 
     begins: np.ndarray
     terms: np.ndarray
-    stages: np.ndarray | int = 0
+    shifts: np.ndarray | float = 0.0
 
-    def __call__(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
-        """Return the values at `places` of the numbered stages, all (count,)."""
-        number = self._numbers(places, stages)
+    def __call__(self, places: np.ndarray, shifts: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the values at `places` of stages with these `shifts`, all (count,)."""
+        number = self._numbers(places, shifts)
         apart, (value, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
         return value + apart * (slope + apart * (bend + apart * twist))
 
-    def slope(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
-        """Return the slopes at `places` of the numbered stages, all (count,)."""
-        number = self._numbers(places, stages)
+    def slope(self, places: np.ndarray, shifts: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the slopes at `places` of stages with these `shifts`, all (count,)."""
+        number = self._numbers(places, shifts)
         apart, (_, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
         return slope + apart * (2 * bend + apart * 3 * twist)
 
     @cached_property
     def _line(self) -> np.ndarray:
         """Return where the cubics begin on the line of all stages."""
-        return _on_line(self.begins, self.stages)
+        return _on_line(np.minimum(self.begins, STAGE_SHIFT / 2), self.shifts)
 
-    def _numbers(self, places: np.ndarray, stages: np.ndarray | int) -> np.ndarray:
-        """Return the numbers of the cubics at `places` of the numbered stages, all (count,)."""
-        return self._line.searchsorted(_on_line(places, stages), side="right") - 1
+    def _numbers(self, places: np.ndarray, shifts: np.ndarray | float) -> np.ndarray:
+        """Return the numbers of the cubics at `places` of stages with these `shifts`, all (count,)."""
+        return self._line.searchsorted(_on_line(places, shifts), side="right") - 1
 
 
-def _on_line(places: np.ndarray, stages: np.ndarray | int) -> np.ndarray:
-    """Return where coordinates of the numbered stages lie on the line of all stages."""
-    return np.clip(places, -STAGE_SHIFT / 2, STAGE_SHIFT / 2) + STAGE_SHIFT * np.asarray(stages)
+def _on_line(places: np.ndarray, shifts: np.ndarray | float) -> np.ndarray:
+    """Return where coordinates of stages lie on the line of all stages."""
+    return np.maximum(places, -STAGE_SHIFT / 2) + shifts
 
 
 def at_rest(begin: float) -> Cubics:
@@ -103,7 +103,12 @@ def join(parts: Sequence[Cubics]) -> Cubics:
 
 def side_by_side(curves: Sequence[Cubics]) -> Cubics:
     """Return the curves of several stages as one."""
-    return replace(join(curves), stages=np.repeat(np.arange(len(curves)), [len(one.begins) for one in curves]))
+    return replace(join(curves), shifts=shifts_of([len(one.begins) for one in curves]))
+
+
+def shifts_of(counts: Sequence[int]) -> np.ndarray:
+    """Return the shifts of so many places of each of several stages on the line of all stages."""
+    return np.repeat(STAGE_SHIFT * np.arange(len(counts)), counts)
 
 
 def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Cubics:

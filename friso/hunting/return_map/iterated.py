@@ -37,33 +37,33 @@ SAME_ATTRACTOR_SHARE = 0.02
 
 @dataclass(frozen=True)
 class MapLine:
-    """Return map of one stage, or of several that are numbered, as a function of coordinates."""
+    """Return map of one stage, or of several on one line, as a function of coordinates."""
 
     curve: Cubics
 
-    def next(self, places: np.ndarray, stages: np.ndarray | int = 0) -> np.ndarray:
-        """Return the coordinates of the landings that follow landings at `places` of the numbered stages, (count,)."""
-        after = self.curve(places, stages)
+    def next(self, places: np.ndarray, shifts: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the coordinates of the landings that follow those at `places` of stages with `shifts`, (count,)."""
+        after = self.curve(places, shifts)
         distance = after - NEGATIVE_SIDE_SHIFT * np.rint(after / NEGATIVE_SIDE_SHIFT)
         after[distance < np.log(LEAST_SWING)] = REST_COORDINATE
         return after
 
-    def _moved_on(self, at: np.ndarray, stages: np.ndarray) -> np.ndarray:
+    def _moved_on(self, at: np.ndarray, shifts: np.ndarray) -> np.ndarray:
         """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
 
         Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
         x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in the most
         landings that may be passed over.
         """
-        after = self.next(at, stages)
-        slope = self.curve.slope(at, stages) * self.curve.slope(after, stages)
-        step = self.next(after, stages) - at
+        after = self.next(at, shifts)
+        slope = self.curve.slope(at, shifts) * self.curve.slope(after, shifts)
+        step = self.next(after, shifts) - at
         with np.errstate(all="ignore"):
             times = np.minimum(0.5 / np.abs(1 - slope), MOST_PASSED_LANDINGS / 2)
         return np.where((times > 1) & (at > REST_COORDINATE) & (np.abs(step) < SLOW_MOVE_LOG), at + times * step, at)
 
-    def followed(self, at: np.ndarray, stages: np.ndarray) -> np.ndarray:
-        """Iterate the maps of numbered stages from coordinates, both (points,), until they are on attractors.
+    def followed(self, at: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+        """Iterate the maps of stages with these `shifts` from coordinates, both (points,), to their attractors.
 
         Returns their last landings: coordinates, shape (points, landings).
         """
@@ -71,18 +71,18 @@ class MapLine:
         paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
         before = np.zeros(len(at))
         for iterations in (*QUICK_ITERATIONS, *MAP_ITERATIONS):
-            at = paths[left, -1]
+            at, own = paths[left, -1], shifts[left]
             for number in range(iterations):
                 if number % MOVE_ON_LANDINGS == 0:
                     goes = at > REST_COORDINATE
                     paths[left[~goes]] = REST_COORDINATE
-                    left, at = left[goes], at[goes]
+                    left, at, own = left[goes], at[goes], own[goes]
                     if not left.size:
                         return paths
-                    at = self._moved_on(at, stages[left])
-                at = self.next(at, stages[left])
+                    at = self._moved_on(at, own)
+                at = self.next(at, own)
             for k in range(landings):
-                paths[left, k], at = at, self.next(at, stages[left])
+                paths[left, k], at = at, self.next(at, own)
             strays = _strays(paths[left])
             slow = strays > ARRIVED_SHARE
             if iterations in MAP_ITERATIONS:

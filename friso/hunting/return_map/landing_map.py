@@ -25,6 +25,7 @@ from friso.hunting.return_map.curve import (
     fitted,
     join,
     piece_about,
+    shifts_of,
     side_by_side,
 )
 from friso.hunting.return_map.iterated import SAME_ATTRACTOR_SHARE, MapLine, repeats_after
@@ -221,7 +222,7 @@ class LandingMap:
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
         """Return which landings, as signed distances, lead to swinging for ever, (count,)."""
         at = self._places(distances)
-        return np.all(self._line.followed(at, np.zeros(len(at), np.int64)) > REST_COORDINATE, axis=1)
+        return np.all(self._line.followed(at, np.zeros(len(at))) > REST_COORDINATE, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
@@ -285,9 +286,7 @@ def attractors_of(maps: Sequence[LandingMap]) -> list[tuple[MapAttractor, ...]]:
     """Return the attractors of each of several maps, which are iterated together from their points."""
     counts = [one.after.size for one in maps]
     starts = np.concatenate([one._places(one.after) for one in maps])
-    paths = MapLine(side_by_side([one._curve for one in maps])).followed(
-        starts, np.repeat(np.arange(len(maps)), counts)
-    )
+    paths = MapLine(side_by_side([one._curve for one in maps])).followed(starts, shifts_of(counts))
     parts = np.split(paths, np.cumsum(counts[:-1]))
     return [tuple(one._told_apart(part)) for one, part in zip(maps, parts, strict=True)]
 
