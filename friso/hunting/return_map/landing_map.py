@@ -239,6 +239,8 @@ class LandingMap:
         swings = repeats_after(paths, self.symmetric)
         while left.any():
             number = int(np.flatnonzero(left)[0])
+            if not swings[number]:  # the path that spreads most shows the whole attractor
+                number = int(np.where(left & (swings == 0), np.ptp(paths, axis=1), -1.0).argmax())
             first, count = paths[number], int(swings[number])
             near = np.abs(paths[:, :, None] - first[None, None, : max(count, 1)]) < SAME_ATTRACTOR_SHARE
             same = left & (near.any(axis=1).all(axis=1) if count else (swings == 0) & _mixed(paths, first))
