@@ -11,7 +11,6 @@ from benchmarks.code_digest import code_digest
 from benchmarks.oracles.edges import FINE, QUOTAS, ROUNDS, Quota, Record, kept, of_quota
 from benchmarks.oracles.oracle import Finding, Oracle
 from benchmarks.report import Task, each
-from benchmarks.return_map.answers import checked
 from benchmarks.truth.claims import ATTRACTED
 from benchmarks.truth.draws import draw
 from benchmarks.truth.kept import CHECKED
@@ -19,7 +18,8 @@ from benchmarks.truth.swings import RESTS, SWINGS
 from friso.engine.kernel import kernel, kernels
 from friso.equations.bandwidth import faster
 from friso.equations.structure import structure
-from friso.hunting import Swinging, find_swings, needed_kernels
+from friso.hunting import AttractionEnd, Swinging, check_given, find_swings, needed_kernels
+from friso.stage import Stage
 
 ANSWERS = Path("benchmark_results/oracles.jsonl")
 """Friso's answers, a line each, with a digest of the code that gave them. Stages in the file are not asked again."""
@@ -48,6 +48,19 @@ def answer(record: Record) -> Record:
 
     task = record["series"], record["seed"], record["number"], code_digest(CHECKED)
     return next(said for _, said in each([task], asked, ANSWERS))
+
+
+def checked(stage: Stage) -> Record:
+    """Return what friso says about a stage as given, as data; an end beyond the range searched is None."""
+    said = check_given(stage).judgement
+    edge = said.margin and {"factor": said.margin.factor, "certain": said.margin.certain, "quiet": said.margin.quiet}
+    verdict = "runs away" if said.runs_away else said.verdict
+    windows = [[_end(window.low), _end(window.high)] for window in said.windows]
+    return {"verdict": verdict, "certain": said.hunting.certain, "edge": edge, "windows": windows}
+
+
+def _end(end: AttractionEnd | None) -> Record | None:
+    return end and {"factor": end.inside, "quiet": end.outside}
 
 
 def edges() -> Iterator[Finding]:
