@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from cycles import swings
 from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, van_dijk
 
 from friso.engine.arrays import Status
@@ -25,7 +24,6 @@ from friso.hunting import (
     Hunting,
     check_given,
     find_cycles,
-    find_margin,
     find_swings,
     hunting,
     judge_many,
@@ -61,14 +59,6 @@ def only(chosen: Stage, rtol: float = CYCLE_RTOL) -> Cycle:
     """The one cycle there is."""
     (cycle,) = hunting_of(chosen, rtol).cycles
     return cycle
-
-
-def test_what_attracts_one_stage_is_what_its_flat_keys_tell() -> None:
-    """Amplitude and period equal those of the stable cycle; beyond its edge there is nothing."""
-    stage = rigid(4)
-    (swing,), cycle = find_swings(stage.flat()), only(stage)
-    assert (swing.amplitude, swing.period) == pytest.approx((cycle.amplitude, cycle.period), rel=1e-9)
-    assert find_swings(rigid(20).flat()) == ()
 
 
 def test_reference_cycle_of_a_rigid_mass() -> None:
@@ -110,16 +100,6 @@ def test_cycles_of_the_rig(
     assert cycle.multiplier == pytest.approx(computed[1], abs=2e-5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("crossover", "attracting"), [(8, True), (12, False)])
-def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
-    """The cycle becomes unstable near 9.77 Hz: found from below and from above, where the multiplier passes -1."""
-    edge = find_margin(rigid(crossover), attracting)
-    assert 9.76 < edge.crossover < 9.78
-    assert edge.factor == pytest.approx(edge.crossover / crossover, rel=1e-12)
-    assert only_symmetric(hunting_of(rigid(edge.crossover))).multiplier == pytest.approx(-1, abs=1e-5)
-
-
 def only_symmetric(survey: Hunting) -> Cycle:
     (cycle,) = (item for item in survey.cycles if item.symmetric)
     return cycle
@@ -141,17 +121,6 @@ def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multipl
     assert symmetric.attracts
     assert turns[0] < 0.97 * symmetric.amplitude
     assert turns[1] > 1.03 * symmetric.amplitude
-
-
-@pytest.mark.slow
-def test_asymmetric_pair_shrinks_into_the_flip() -> None:
-    """The pair's multiplier falls to 1, and its turns approach each other like the root of the distance to the flip."""
-    off = {}
-    for crossover in (9.65, 9.74):
-        result = hunting_of(rigid(crossover))
-        (beside,) = (cycle for cycle in result.cycles if not cycle.symmetric)
-        off[crossover] = float(beside.trace.position.max() + beside.trace.position.min())
-    assert off[9.65] / off[9.74] == pytest.approx(np.sqrt((9.77 - 9.65) / (9.77 - 9.74)), rel=0.02)
 
 
 @pytest.mark.cases(first=2)
@@ -260,24 +229,6 @@ def test_multipliers_of_machines_drawn_at_random() -> None:
         assert -2 < cycle.multiplier < 0
 
 
-@pytest.mark.slow
-def test_machines_drawn_at_random_hunt_as_their_cycles_say() -> None:
-    """Machines are released at 32 displacements from 0.1 to 30 mm and followed for a hundred periods.
-
-    Without a stable cycle, they rest after all; otherwise they swing as far as the cycle after some, within the
-    remaining transient, and rest after the others.
-    """
-    for item in machines():
-        result = hunting_of(item)
-        period = result.cycles[0].period if result.cycles else 4.0
-        swing = last_swing(item, np.geomspace(1e-4, 3e-2, 32), 100 * period, 2 * period)
-        going = swing[swing > item.flat()["friction.static"] / item.flat()["friction.bristle_stiffness"]]
-        assert bool(going.size) == bool(result.attracting)
-        for cycle in result.attracting:
-            left = 10 * abs(cycle.multiplier) ** 200
-            assert going == pytest.approx(cycle.amplitude, rel=1e-4 + left)  # at rtol 1e-6
-
-
 def last_swing(chosen: Stage, displacements: np.ndarray, duration: float, last: float) -> np.ndarray:
     """Half of peak to peak [m] over the `last` seconds after releases, shape (displacements,)."""
     count = displacements.size
@@ -346,18 +297,6 @@ def test_unequal_friction_keeps_a_cycle_off_the_reference() -> None:
         assert cycle.amplitude == pytest.approx(equal, rel=2e-3)
         assert cycle.period > 3.15031069
         assert cycle.multiplier == pytest.approx(0.8172509**2, rel=1e-3)
-
-
-@pytest.mark.cases(first=1)
-@pytest.mark.parametrize(("crossover", "share"), [(4, 0.01), (4, 0.05), (8, 0.01)])
-def test_simulation_with_unequal_friction_settles_on_the_cycle(crossover: float, share: float) -> None:
-    """Long after a release, its turning points lie as far ahead and behind as those of the cycle."""
-    chosen = rigid(crossover, friction__asymmetry=share)
-    cycle = only(chosen)
-    _, heights = swings(chosen.replace({"motion.displacement": "3 mm", "motion.duration": "250 s"}), rtol=1e-8)
-    assert (heights[-3] + heights[-2]) / 2 == pytest.approx(cycle.amplitude, rel=1e-5)
-    turns = [float(cycle.trace.position.max()), -float(cycle.trace.position.min())]
-    assert np.sort(heights[-3:-1]) == pytest.approx(np.sort(turns), rel=1e-4)  # as finely as the trace is sampled
 
 
 def test_mirrored_friction_mirrors_the_cycle() -> None:
