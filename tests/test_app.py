@@ -810,6 +810,7 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
     assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("question", ["verdict", "check"])
 def test_a_verdict_that_leaves_out_an_unstable_drive_is_not_certain(served: Served, question: str) -> None:
     """The wrist of the examples settles without its delays, with which it buzzes."""

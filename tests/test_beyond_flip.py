@@ -39,6 +39,7 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
     assert abs(traced.value(flip.point.place) - 5.6065) + 0.0075 < traced.error(flip)
 
 
+@pytest.mark.slow
 def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig: Stage) -> None:
     """The fold lies elsewhere than where the multiplier over a hundredth of the distance is 1 (3.64663 Hz).
 

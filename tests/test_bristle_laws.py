@@ -23,7 +23,7 @@ from variants import (
 import friso
 from benchmarks import by_hand as plain
 from friso.engine.batch import Inputs, run_driven
-from friso.engine.kernel import KernelRequest, kernel, kernels
+from friso.engine.kernel import kernel
 from friso.equations.imposed import Driven
 from friso.equations.structure import structure
 from friso.errors import InputError
@@ -39,12 +39,6 @@ from friso_thesis.studies.describing.multi import OneStateLaw
 LAWS = {"elasto_plastic": elasto_plastic(), "rolling": rolling()}
 
 HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk("3 Hz")) for name, law in LAWS.items()}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    forms = [structure(item.flat()) for item in HUNTING.values()]
-    kernels([*map(KernelRequest, forms), *(KernelRequest(form, True) for form in forms)])
 
 
 def drift(friction: str, periods: int) -> float:

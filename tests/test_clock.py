@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from friso.engine import simd_math
 from friso.engine.arrays import Results, Status, Tables
 from friso.engine.batch import RunOptions, options_of, prepare, run_batch, simulate
-from friso.engine.kernel import Kernel, KernelRequest, empty_results, kernel, kernels
+from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
 from friso.equations.blocks import Loop
 from friso.equations.component import Held, key, state
@@ -57,12 +57,6 @@ def surroundings() -> Tables:
     places[0, 2] = 1 + 0.2 * np.cos(np.arange(POINTS))
     times = np.array([[3 * np.sin(40 * time), 0.2 * np.cos(90 * time)]])
     return Tables(places, np.array([[-1e-3, 1 / GRID]]), times, np.array([1 / SPACING]))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    """Compile all kernels of these tests side by side."""
-    kernels([KernelRequest(AsBuilt.of(keys(axis(), delay))) for delay in (0.0, 2.0)])
 
 
 def run(

@@ -101,6 +101,7 @@ def test_a_log_without_a_reference_is_refused() -> None:
         standing_of(Log("log", log.time, STEP, {"position": log["position"]}, log.segments))
 
 
+@pytest.mark.slow
 def test_a_stage_without_friction_hunts_from_a_level_on(hunting: Stage) -> None:
     """The level of the thesis's own friction, 1 N, lies among those at which similar contacts hunt with the joint
     locked; a stage that states friction is not asked."""

@@ -29,8 +29,6 @@ from variants import (
 )
 
 from benchmarks import by_hand as plain
-from friso.engine.kernel import KernelRequest, kernels
-from friso.equations.imposed import imposed_form
 from friso.stage import Stage
 from friso.stage.tables import FRICTION
 from friso_thesis.studies.describing.balance import TOUCHES
@@ -57,11 +55,6 @@ STEADY = settings(max_examples=25)
 
 def rigid(friction: str) -> Stage:
     return stage(HOLD, friction=friction, controller=van_dijk())
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    kernels([KernelRequest(imposed_form(rigid(law).flat())) for law in LAWS.values()])
 
 
 def test_every_law_with_a_force_is_tried() -> None:

@@ -316,6 +316,7 @@ def test_words(designed: Design, snapshots: Snapshots) -> None:
     snapshots.check("design", "sentences", "\n".join(texts))
 
 
+@pytest.mark.slow
 def test_the_window_of_the_crossover(designed: Design) -> None:
     above, below = upper(designed), lower(designed)
     assert [item.value for item in above] == sorted(item.value for item in above)

@@ -552,6 +552,7 @@ def fast_stage(factor: float = 1.0, **settings: Any) -> Stage:
     )
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("factor", [2.7, 0.1])
 @pytest.mark.parametrize(
     ("settings", "name"),

@@ -6,10 +6,7 @@ from variants import MICRO_DAMPING, VARIANTS, gains, gms, release, stage, van_di
 
 import friso
 from benchmarks.by_hand import X, Z, by_hand
-from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.friction.laws import GeneralisedMaxwellSlip, polygon
-from friso.equations.imposed import imposed_form
-from friso.equations.structure import structure
 from friso.frequency.loops import plant
 from friso.frequency.system import member
 from friso.hunting import Ensemble, find_cycles
@@ -47,13 +44,6 @@ def imposed(displacement: np.ndarray) -> np.ndarray:
     for moved in np.diff(displacement):
         deflections.append(np.clip(deflections[-1] + moved, -LIMIT, LIMIT))
     return np.array(deflections)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    hunts = structure(HUNTS.flat())
-    forms = [structure(HELD.flat()), hunts, imposed_form(HELD.flat())]
-    kernels([*map(KernelRequest, forms), KernelRequest(hunts, True)])
 
 
 @pytest.mark.slow

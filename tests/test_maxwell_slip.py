@@ -9,15 +9,13 @@ from variants import FULL, gains, maxwell, release, stage, van_dijk
 import friso
 from benchmarks.by_hand import V, X, Z, by_hand
 from friso.engine.kernel import KernelRequest, kernels
-from friso.equations.as_built import AsBuilt
 from friso.equations.component import Kink, Switch, state
-from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.loops import plant
 from friso.frequency.system import level, member, speeds, steady_force
 from friso.hunting import Cycles, Ensemble, find_cycles
-from friso.virtual_rig.run import as_built_keys, run
+from friso.virtual_rig.run import run
 from friso.virtual_rig.task import own_motion
 
 STIFFNESS, STRENGTH, LIMIT = np.array([1e5, 8e4, 6e4]), np.array([0.9, 0.96, 0.96]), np.array([9e-6, 12e-6, 16e-6])
@@ -34,21 +32,6 @@ MOVES = stage(THERE_AND_BACK, friction=maxwell(), controller=gains(**FULL, tau=1
 
 DROPS = stage(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
 """The force of an element drops as it breaks loose, so that the stage hunts."""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    drops, moves = structure(DROPS.flat()), structure(MOVES.flat())
-    built = KernelRequest(AsBuilt.of(as_built_keys(MOVES)), method="Rodas4")
-    kernels(
-        [
-            KernelRequest(moves),
-            KernelRequest(drops),
-            KernelRequest(drops, True),
-            KernelRequest(imposed_form(MOVES.flat())),
-            built,
-        ]
-    )
 
 
 # simulate
