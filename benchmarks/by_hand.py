@@ -1104,14 +1104,6 @@ def drive(flat: Flat) -> Drive:
     return Drive(numbers, _friction_of(flat, "friction.")[0].view(RUB).view(np.recarray), np.array(ends), schedule)
 
 
-def relaxed(flat: Flat, displacement: float) -> float:
-    """Return the integral [m s] with which the drive of a displaced stage at rest exerts no force."""
-    of = drive(flat)
-    inside, n = np.append((displacement < of.windows[:, 0]).astype(float), of.windows[0, 0]), of.numbers[0]
-    acting, gains, _ = _shares(of, inside, True, -displacement, 0.0)
-    return float(-gains * n.kp * acting / n.ki)
-
-
 def trace(flat: Flat, start: np.ndarray, times: np.ndarray, step: float, sample: float = 0.0) -> np.ndarray:
     """Return positions [m] of a stage at times [s], from position, velocity, bristle and integral at the first.
 

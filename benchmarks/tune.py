@@ -5,9 +5,7 @@ and with a parasitic mode (24, by their numbers) are tuned remedy by remedy, the
 settings over the same ranges is measured by the same moves and margins on the same machines. The best setting at which
 no machine hunts, and which meets the goal on a hundred others, is compared with the tuned one in the settling time of
 95 %. If tuning found nothing, anything that the brute search finds counts as missed. All tuned stages are measured on
-fresh machines, and the fraction that meets the goal is counted. `--thesis` tunes the rig of the thesis instead;
-`--findings` tests on it two statements about friction isolators: that they narrow the stable range of gains, and that
-they help less at some step sizes.
+fresh machines, and the fraction that meets the goal is counted. `--thesis` tunes the rig of the thesis instead.
 """
 
 import argparse
@@ -21,13 +19,13 @@ from scipy.stats import qmc
 
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
-from friso.frequency.bode import limits, loop_bandwidths
+from friso.frequency.bode import loop_bandwidths
 from friso.questions.tune.words import changes
-from friso.remedies.catalogue import BANDWIDTH, Remedy
-from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
+from friso.remedies.catalogue import BANDWIDTH
+from friso.remedies.machines import Fleet, Goal, draw_fleet
 from friso.remedies.method import machines_of_search, tune
 from friso.remedies.search import Budget, Search, modulus_margins, moves_of_points
-from friso.remedies.verified import NO_VARIABLES, Performance, moving
+from friso.remedies.verified import Performance, moving
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
 
@@ -183,34 +181,6 @@ def thesis() -> None:
         )
 
 
-def findings() -> None:
-    """Test the rig with its joint locked and free.
-
-    It finds the crossovers that are stable and keep a modulus margin of 0.5, and how soon steps of many sizes settle:
-    at a crossover at which neither hunts, and at one at which the locked one does.
-    """
-    rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
-    stages = {name: rig.replace({"joint.locked": name == "locked"}) for name in ("locked", "free")}
-    rows = []
-    for name, stage in stages.items():
-        ranges = limits(stage.flat())
-        parts = (ranges.stable, ranges.comfortable)
-        rows.append((name, *("; ".join(f"{low:.4g} to {high:.4g}" for low, high in part) for part in parts)))
-    print_table(("joint", "stable [Hz]", "modulus margin of 0.5 [Hz]"), rows)
-    columns = [np.geomspace(*SIZES, STEPS)]
-    alone = Fleet({}, {}, columns[0], MoveRange(*SIZES), (), {})
-    for hertz, (_, stage) in product(CROSSOVERS, stages.items()):
-        step = {"kind": "step", "size": "1 mm", "duration": "20 s"}
-        steps = Remedy.settled_on("", stage.replace({"motion": step, "controller.crossover": f"{hertz} Hz"}))
-        columns.append(moves_of_points(steps, NO_VARIABLES, alone, Goal()).settling[0])
-    names = [f"{name}, {hertz} Hz [s]" for hertz, name in product(CROSSOVERS, stages)]
-    print_table(("step [m]", *names), [tuple(f"{value:.3g}" for value in row) for row in zip(*columns, strict=True)])
-
-
-SIZES, STEPS, CROSSOVERS = (1e-5, 1e-1), 25, (8, 12)
-"""Ends of the step sizes [m], their number, and the crossovers [Hz]."""
-
-
 def main() -> None:
     """Tune machines, search by brute force, measure on fresh machines."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -219,12 +189,9 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, default=10_000)
     parser.add_argument("--ways", nargs="*", default=["bandwidth", "gains"])
     parser.add_argument("--thesis", action="store_true")
-    parser.add_argument("--findings", action="store_true")
     options = parser.parse_args()
     if options.thesis:
         return thesis()
-    if options.findings:
-        return findings()
     wanted = Goal(within=WITHIN, bandwidth_limit=LIMIT, joint=False)
     rows: list[tuple[str, ...]] = []
     ratios, met = list[float](), list[float]()

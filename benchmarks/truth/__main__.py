@@ -14,19 +14,16 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 
-from benchmarks.by_hand import NotWritten
 from benchmarks.truth.attack import attack
 from benchmarks.truth.draws import SERIES, UNDER_LAWS, draw, numbers_of
 from benchmarks.truth.kept import KeptAttacks, Record, dated, is_current
-from benchmarks.truth.positions import compared, summary
 from benchmarks.truth.tally import document, page, print_tally
 from friso.engine.kernel import kernels
 from friso.hunting import needed_kernels
@@ -36,9 +33,6 @@ from friso.platform.system import usable_cores
 def main() -> None:
     arguments = _arguments()
     numbers = arguments.number or numbers_of(arguments.series, arguments.first, arguments.stages)
-    if arguments.simulate:
-        _simulate(arguments.seed, numbers, arguments.series)
-        return
     kept = KeptAttacks(arguments.kept or arguments.out / "attacks.jsonl")
     for line in kept.damaged:
         _tell(f"{kept.file}, line {line}, is damaged: if no other line tells of its stage, that is attacked again")
@@ -81,28 +75,6 @@ def _attack_all(arguments: argparse.Namespace, numbers: Sequence[int], keep: Cal
     except KeyboardInterrupt:
         _tell("interrupted")
     _tell(f"  {time.perf_counter() - start:.0f} s, in which checks and attacks took {busy:.0f} s of CPU")
-
-
-def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
-    """Compare runs with SciPy, stage by stage.
-
-    Stages whose equations are not written by hand are left out.
-    """
-    records: list[dict[str, Any]] = []
-    try:
-        for number in numbers:
-            try:
-                records.append(compared(seed, number, series))
-            except NotWritten as missing:
-                print(f"  {number:5d}  no equations by hand ({missing})", flush=True)
-                continue
-            print(
-                f"  {number:5d}  {records[-1]['off']:.1e}  {records[-1]['kind']}, {records[-1]['status']}", flush=True
-            )
-    except KeyboardInterrupt:
-        print("interrupted")
-    if records:
-        summary(records)
 
 
 def _attacked(arguments: argparse.Namespace, numbers: Sequence[int]) -> Generator[Record]:
@@ -171,7 +143,6 @@ def _arguments() -> argparse.Namespace:
         help="series: stages under this law of friction, whose cycles SciPy follows from event to event, too",
     )
     parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
-    parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")
     parser.add_argument("--kept", type=Path, help="file of attacks, gone on with; default: attacks.jsonl in --out")
     parser.add_argument("--redo", action="store_true", help="attack stages again that other code was attacked with")
     parser.add_argument("--report", action="store_true", help="attack nothing; report all that the file holds")
