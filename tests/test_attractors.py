@@ -73,15 +73,6 @@ def test_irregular_swings_are_tried_again_from_where_they_were_seen() -> None:
     assert survey.certain
 
 
-@pytest.mark.slow
-def test_a_stage_that_settles_from_everywhere() -> None:
-    """Above its edge at 9.77 Hz the rigid mass has a cycle that repels; nothing attracts."""
-    above = hunting(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
-    assert above.certain
-    assert above.target is None
-    assert [cycle.attracts for cycle in above.cycles] == [False]
-
-
 def test_the_period_of_a_doubled_orbit_is_told_by_its_swings() -> None:
     """At 12.66 Hz the creeping stage swings every 2.07 s, and repeats itself after twice that."""
     attracted = find_attractors(BOOK["creeping"].replace({"controller.crossover": "12.6553 Hz"}).flat(), 1)

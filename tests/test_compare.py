@@ -22,7 +22,7 @@ from friso.errors import InputError
 from friso.frequency.margins import margins
 from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import limit_cases, member
-from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
+from friso.hunting.criteria import settling_of_traces
 from friso.intervals import quantile_interval, share
 from friso.questions.compare.blocks import compare_document, rows, sentences
 from friso.remedies import comparison as study
@@ -271,27 +271,6 @@ TIME = np.arange(0, 20, 0.01)
 frequencies, sizes = st.floats(0.25, 5.0), st.floats(1e-5, 1e-2)
 
 
-def words(deviation: np.ndarray, within: float) -> list[str]:
-    """Return the outcomes of runs."""
-    return outcomes(end_of_traces(TIME, deviation, within), within).tolist()
-
-
-@settings(max_examples=40)
-@given(frequencies, sizes, st.floats(0.05, 2.0), st.floats(-1e-3, 1e-3))
-def test_what_goes_to_and_fro_swings(frequency: float, size: float, within: float, offset: float) -> None:
-    swing = offset + size * np.sin(2 * np.pi * frequency * TIME)[None]
-    assert words(swing, within * 1e-6) == ["swings"]
-    assert words(swing, 1.1 * size) != ["swings"]
-
-
-@settings(max_examples=40)
-@given(frequencies, sizes, st.floats(1.0, 5.0), st.floats(-1e-3, 1e-3))
-def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: float, offset: float) -> None:
-    dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
-    creeping = offset - size * TIME
-    assert "swings" not in words(np.array([dying, creeping, offset + 0 * TIME]), 1e-6)
-
-
 @settings(max_examples=40)
 @given(st.floats(0.01, 15.0), st.floats(0.1, 100.0), st.floats(0.0, 4.0))
 def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> None:
@@ -376,13 +355,6 @@ def test_a_drive_without_a_clock_gets_one_beside_one_with(built: Stage) -> None:
 
 
 SHORT = {"motion.return_at": "0.3 s", "motion.duration": "0.8 s"}
-
-
-@pytest.mark.slow
-def test_a_run_that_fails_does_not_swing(comparison: Comparison) -> None:
-    result = with_measures(comparison.results[0], outcome="failed", settling=np.inf)
-    assert (result.failed, result.swinging.low, result.swinging.high) == (COUNT, 0, 1)
-    assert np.isnan(result.swinging.probability)
 
 
 @pytest.mark.slow

@@ -6,8 +6,6 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from refusals import refused
 from scipy.integrate import solve_ivp
 from scipy.special import dawsn
@@ -49,8 +47,6 @@ LAWS = {
 }
 STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
 """Laws of which all or a part follows small motions as a spring."""
-
-STEADY = settings(max_examples=25)
 
 
 def rigid(friction: str) -> Stage:
@@ -122,17 +118,6 @@ def test_static_law_equals_python_control() -> None:
 
     result = control.describing_function(curve, amplitudes * omega, num_points=4000)
     assert of(flat, amplitudes, 5.0) == pytest.approx(1j * omega * result, rel=1e-7)
-
-
-def test_dahl_loses_what_a_spring_behind_a_backlash_loses() -> None:
-    """A spring that slips at F_c is k (x - backlash of x); its loop and Dahl's have the same area, 4 F_c (A - F_c/k),
-    but for exp(-2 k A/F_c). Their springs differ, by Dahl's rounder corners."""
-    amplitudes = np.array([4e-5, 1e-4, 1e-3])
-    backlash = control.friction_backlash_nonlinearity(2 / 1e5)
-    spring = 1e5 * (1 - control.describing_function(backlash, amplitudes))
-    dahl = of(changed(DAHL, viscous=0.0), amplitudes, 1.0)
-    left = np.exp(-2e5 * amplitudes) * 5
-    assert np.all(np.abs(np.imag(dahl) / np.imag(spring) - 1) < left + 1e-7)
 
 
 def test_presliding_limit() -> None:
@@ -239,40 +224,6 @@ def test_asymmetric_sliding_has_a_mean_force() -> None:
     assert np.imag(responses["stiffness"].item()) == pytest.approx(4 / np.pi / 0.2 + np.pi, rel=0.01)
 
 
-@pytest.mark.slow
-@STEADY
-@given(st.floats(1e-7, 1e-1), st.floats(0.05, 200), st.floats(0.2, 1), st.floats(0, 300), st.floats(1.01, 2))
-def test_passive_friction_takes_energy(
-    amplitude: float, frequency: float, share: float, damping: float, more: float
-) -> None:
-    """sigma_2 > sigma_1 (F_s - F_c)/F_c (Astrom & Canudas de Wit 2008)."""
-    viscous = more * damping * (1 - share) / share
-    flat = changed(LAWS["lugre"], static=1.0, coulomb=share, bristle_damping=damping, viscous=viscous)
-    (value,) = of(flat, amplitude, frequency)
-    assert np.imag(value) > 0
-
-
-@pytest.mark.slow
-@STEADY
-@given(st.floats(1e-7, 1e-1), st.floats(0.05, 200), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), st.floats(0.1, 10))
-def test_units(amplitude: float, frequency: float, length: float, force: float, time: float) -> None:
-    flat = rigid(LAWS["lugre"]).flat()
-    damping = force * time / length
-    factors = {"static": force, "coulomb": force, "stribeck_velocity": length / time}
-    factors |= {"bristle_stiffness": force / length, "bristle_damping": damping, "viscous": damping}
-    other = flat | {f"friction.{key}": flat[f"friction.{key}"] * factor for key, factor in factors.items()}
-    (one,), (scaled,) = of(flat, amplitude, frequency), of(other, amplitude * length, frequency / time)
-    assert abs(scaled / (one * force / length) - 1) < 1e-6
-
-
-def test_sinusoids_lose_energy_although_the_thesis_values_are_not_passive() -> None:
-    """Sinusoids lose energy at all examined amplitudes and frequencies; friction is a negative spring at some."""
-    responses = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
-    assert set(np.ravel(responses["status"])) == {"done"}
-    assert float(responses["work"].min()) > 0
-    assert float(np.real(responses["stiffness"]).min()) < 0
-
-
 def test_friction_may_differ_from_pair_to_pair() -> None:
     flat, levels = rigid(LAWS["lugre"]).flat(), np.array([1.5, 3.0])
     both = of(flat | {"friction.static": levels}, [1e-4, 1e-4], 2.0)
@@ -362,29 +313,6 @@ def test_two_motions_under_one_force() -> None:
     start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
     assert abs(from_rest / stuck - 1) < 0.15  # near break-away, of which the first harmonic knows little: it is 0.142
     assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2  # 24 % too large: 0.193
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("forces", "frequency"),
-    [([1.8, 10.0], 0.01), ([1.8, 1000.0], 0.1), ([1e-3, 1.0, 300.0], 0.01), ([0.01, 2.0, 30.0], 5.0)],
-)
-def test_answers_do_not_depend_on_what_else_is_asked(forces: list[float], frequency: float) -> None:
-    together = plant_response(rigid(LAWS["lugre"]), forces, [40.0, frequency])
-    assert set(np.ravel(together["status"])) == {"done"}
-    assert set(np.ravel(together["answers"])) <= {1, 3}
-    for i, force in enumerate(forces):
-        alone = plant_response(rigid(LAWS["lugre"]), [force], [frequency])
-        assert together["answers"].values[i, 1] == alone["answers"].item()
-        count = alone["answers"].item()
-        assert np.array_equal(together["amplitude"].values[i, 1, :count], alone["amplitude"].values[0, 0])
-
-
-def test_stuck_answer_of_slow_forces() -> None:
-    """1.8 N from rest bends the bristles, however slowly and however much more another force is."""
-    response = plant_response(rigid(LAWS["lugre"]), [1.8, 1000.0], [0.1])
-    assert response["lasting"].values[0, 0].tolist() == [1.0, 0.0, 1.0]
-    assert abs(response["up"].values[0, 0]) == pytest.approx(1.13e-5, rel=1e-2)
 
 
 @pytest.mark.slow

@@ -3,9 +3,9 @@
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,7 +40,6 @@ from friso.identification.output_error.fit import (
     explained_by,
     first_values,
     polished,
-    refine_fit,
 )
 from friso.identification.output_error.parameters import BRISTLES, FitParameter, fit_parameters
 from friso.identification.output_error.problem import Problem, tracking
@@ -422,23 +421,6 @@ def test_noise_has_no_cause() -> None:
     assert causes_of(with_signals(usual()[0], force=noise + 0.2 * usual()[0]["force"])) == []
 
 
-def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
-    delayed = with_signals(usual()[0], **late(usual()[0]))
-    inverse, (cause,) = inverse_model(delayed, 5.0), causes_of(delayed)
-    off = Estimate.normal("masses.cart", "kg", inverse.value("mass"), 0.01, "output error")
-    slow = Estimate.normal("friction.static", "N", 9.0, 0.1, "output error")
-    quality = Quality(noise=0.05, left=1.0, noise_left=0.05, inverse_error=inverse.error, whole_error=inverse.error)
-    (blind,) = allowed([off], quality, inverse).estimates
-    assert cause.without is not None
-    case = allowed([off, slow], replace(quality, without=(cause.without,), spoilt=True), inverse)
-    fair, static = case.estimates
-    assert case.correlation.shape == (1, 1)
-    assert not static.determined
-    assert not blind.holds(MASS)
-    assert fair.holds(MASS)
-    assert fair.value == off.value
-
-
 def test_a_feed_forward_that_is_not_logged_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     log, _ = usual()
     ahead = np.roll(log["position"], -20)
@@ -632,62 +614,6 @@ def test_noise_goes_neither_way() -> None:
     assert directions(5e-4 * time + blur) == (True, False)
     assert directions(-5e-4 * time + blur) == (False, True)
     assert directions(5e-4 * np.sin(time) + blur) == (True, True)
-
-
-@dataclass(frozen=True)
-class Valley:
-    """A problem with the residuals of Rosenbrock's valley, whose lowest place is (1, 1), and the rows of derivatives
-    that were asked for."""
-
-    weight: float
-    asked: list[int] = field(default_factory=list)
-    target: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    counted: np.ndarray = field(default_factory=lambda: np.ones(2))
-    parameters: tuple[FitParameter, ...] = tuple(
-        FitParameter(name, "", 0.0, -3.0, 3.0, logarithmic=False) for name in ("a", "b")
-    )
-
-    bounds = Problem.bounds
-
-    def _off(self, inner: np.ndarray) -> np.ndarray:
-        return self.weight * np.stack([10 * (inner[:, 1] - inner[:, 0] ** 2), 1 - inner[:, 0]], axis=1)
-
-    def residuals(self, inner: np.ndarray) -> np.ndarray:
-        return self._off(inner)
-
-    def jacobians(self, inner: np.ndarray, free: np.ndarray, residuals: np.ndarray) -> list[np.ndarray]:
-        assert np.array_equal(residuals, self._off(inner))
-        self.asked.append(len(inner))
-        every = [self.weight * np.array([[-20 * a, 10.0], [-1.0, 0.0]]) for a, _ in inner]
-        return [slopes[:, chosen] for slopes, chosen in zip(every, free, strict=True)]
-
-
-NEAR = np.array([[-20 * 1.2, 10.0], [-1.0, 0.0]])
-"""Derivatives of the valley beside its lowest place, at a = 1.2."""
-
-
-def refined(starts: list[list[float]], *pieces: Valley, free: Any = None, iterations: int = 25, **more: Any) -> Any:
-    values = np.array(starts)
-    every = np.ones(values.shape, bool) if free is None else np.array(free)
-    return refine_fit(cast("list[Problem]", [*pieces]), values, every, iterations, 1e-9, **more)
-
-
-def test_a_refined_fit_finds_its_way_along_a_valley_with_few_derivatives() -> None:
-    """Derivatives are updated from step to step: two of three iterations need none."""
-    pieces = [Valley(1.0), Valley(2.0)]
-    ends = refined([[-1.2, 1.0], [1.0, 1.0], [2.0, -2.0]], *pieces).inner
-    assert ends == pytest.approx(np.ones((3, 2)), abs=1e-3)
-    assert pieces[0].asked == pieces[1].asked
-    assert pieces[0].asked[0] == 3
-    assert sum(pieces[0].asked) < 2 * 25
-
-
-@pytest.mark.parametrize("near", [NEAR, -NEAR, np.full((2, 2), np.inf)], ids=["near", "uphill", "infinite"])
-def test_a_refined_fit_goes_on_from_derivatives_that_are_only_near(near: np.ndarray) -> None:
-    """Derivatives of the start's surroundings may even lead uphill: the fit ends with its own."""
-    valley = Valley(1.0)
-    assert refined([[1.1, 1.3], [0.8, 0.7]], valley, slopes=near).inner == pytest.approx(np.ones((2, 2)), abs=1e-3)
-    assert sum(valley.asked) > 0
 
 
 # --- the stage file ---------------------------------------------------------------------------------------------------

@@ -82,12 +82,6 @@ def one_by_one(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key not in arrays} | elements
 
 
-snippets = st.one_of(
-    st.text(max_size=4),
-    st.sampled_from(
-        ["-", "e9", "e400", ".", ",", '"', "\n", "#", "[", "]", "=", " ", "0", "k", "m", "N", "rad", "nan"]
-    ),
-)
 numbers = st.one_of(
     st.floats(1e-3, 1e6).map(repr),
     st.integers(-(10**6), 10**20).map(str),
@@ -122,18 +116,6 @@ scalars = st.one_of(
 )
 
 
-@pytest.mark.slow
-@settings(max_examples=300)
-@given(
-    st.sampled_from(TEXTS), st.lists(st.tuples(st.floats(0, 1), st.integers(0, 12), snippets), min_size=1, max_size=3)
-)
-def test_text_mutations(text: str, edits: list[tuple[float, int, str]]) -> None:
-    for place, length, new in edits:
-        start = round(place * len(text))
-        text = text[:start] + new + text[start + length :]
-    check(text)
-
-
 def values_for(place: tuple[str, str, str]) -> st.SearchStrategy[tuple[tuple[str, str, str], object]]:
     """A place with a value for it: half of them with a unit that the key takes."""
     text, table, key = place
@@ -143,31 +125,13 @@ def values_for(place: tuple[str, str, str]) -> st.SearchStrategy[tuple[tuple[str
     return st.tuples(st.just(place), fitting | scalars)
 
 
-@pytest.mark.thorough
-@settings(max_examples=500)
+@pytest.mark.slow
+@settings(max_examples=200)
 @given(st.sampled_from(KEYS).flatmap(values_for))
 def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
     (text, table, key), value = case
     tables = {**tomllib.loads(text), table: {**tomllib.loads(text)[table], key: value}}
     check(written(tables))
-
-
-@pytest.mark.slow
-@settings(max_examples=200)
-@given(st.sampled_from(KEYS), st.sampled_from(KEYS), st.sampled_from(["drop", "copy", "move"]))
-def test_key_mutations(place: tuple[str, str, str], other: tuple[str, str, str], edit: str) -> None:
-    text, table, key = place
-    tables = tomllib.loads(text)
-    value = tables[table][key] if edit == "copy" else tables[table].pop(key)
-    if edit != "drop":
-        tables.setdefault(other[1], {})[other[2]] = value
-    check(written(tables))
-
-
-@settings(max_examples=100)
-@given(st.binary(max_size=200) | st.text().map(str.encode))
-def test_noise(content: bytes) -> None:
-    check(content.decode(errors="replace"))
 
 
 @pytest.mark.slow

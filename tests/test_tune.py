@@ -1,6 +1,6 @@
 """`friso tune`: machines, remedies, searches and outcomes, with tiny budgets."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
 from itertools import product
@@ -21,7 +21,6 @@ from benchmarks.tune import performance_of
 from friso import Stage, load, loads
 from friso.app import questions
 from friso.design_method.prepare import isolated
-from friso.engine.allowance import allowance
 from friso.engine.batch import simulate
 from friso.equations.bandwidth import breakaway, least_breakaway, sliding, sped_up
 from friso.equations.motion import size
@@ -39,7 +38,6 @@ from friso.remedies.catalogue import (
     FASTEST_UNASKED,
     Remedy,
     SpeedCap,
-    of_key,
     remedies,
     speed_cap,
     suggestion,
@@ -47,7 +45,6 @@ from friso.remedies.catalogue import (
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import Advice, ChangeSize, change_size, least_factors, pairs, tune
 from friso.remedies.search import (
-    LOOKING_WORK,
     Attraction,
     Budget,
     Moves,
@@ -222,18 +219,6 @@ def test_the_weaker_direction_breaks_away_first() -> None:
 
 
 GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controller=False)}
-
-
-def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal, machines: Fleet) -> None:
-    """Settings above it cost more than any below that meet the goal; the limit itself is tried."""
-    search = search_of(remedies(rigid, goal)[0], goal, machines)
-    search.optimise()
-    points = search.points
-    above = points.bandwidth > 25.0
-    assert above.any()
-    assert points.broken(goal)["bandwidth"].tolist() == above.tolist()
-    assert points.cost(goal)[above].min() > points.cost(goal)[points.meets(goal)].max()
-    assert points.bandwidth[~above].max() == pytest.approx(25.0, rel=2e-3)
 
 
 CONTROLLERS = {
@@ -456,48 +441,6 @@ def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     assert 1 / stiffness(behind) == pytest.approx(1 / 220e3 + 1 / 35e6)
 
 
-def test_looking_further_ends_where_it_takes_too_much_work(
-    rigid: Stage, machines: Fleet, goal: Goal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Surveys of a ball screw took minutes per batch of points. The points looked at so far are used."""
-    search = search_of(AS_IS(rigid), goal, machines)
-
-    def points() -> Iterator[np.ndarray]:
-        while True:
-            moves_of_points(AS_IS(rigid), verified.NO_VARIABLES, machines, goal)
-            yield np.zeros(0)
-
-    with allowance() as once:
-        next(points())
-    with RemedySettings(search_work=5 * once.used / LOOKING_WORK).in_use():
-        assert len([*search.looked_at(points())]) == 5
-        assert (
-            search.cut
-        )  # and where it is already, as its settings took too much work, they are looked at all the same
-        assert len([*search.looked_at(points())]) == 5
-        search.cut = False
-        (_,) = search.looked_at(iter([np.zeros(0)]))
-        assert not search.cut
-
-
-def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Surveys of failing settings took as long as those of working ones; the share is then that of fewer machines."""
-    surveyed: list[int] = []
-
-    def attracted(remedy: Remedy, shares: np.ndarray, some: Fleet, goal: Goal, at_once: bool) -> Attraction:
-        surveyed.append(some.count)
-        every = np.ones((1, some.count), bool)
-        return Attraction(every, every, every)
-
-    monkeypatch.setattr(verified, "attraction", attracted)
-    fleet = draw_fleet(rigid, Correlations(), 40, 1)
-    fast = rigid.replace({"controller.crossover": "20 Hz"})
-    measured = performance_of(fast, fleet, Goal(), fast)
-    assert (surveyed, measured.count) == ([10], 10)
-    assert measured.share(Goal()).probability == 0
-    assert measured.moves.settling.shape == measured.attraction.clear.shape == (1, 10)
-
-
 @pytest.mark.slow
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Settings with which only some moves settle are none either: 11.5 Hz is too close to the edge of 9.75 Hz."""
@@ -650,24 +593,6 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
     assert np.diff(np.sort(attracted)).min() > 0.03
 
 
-def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fleet, rigid: Stage) -> None:
-    """The search had converged to settings with a limit cycle, and took the first point without one, far away.
-
-    A brute-force search found one that settles in 89 % of its time.
-    """
-
-    def measured(points: np.ndarray, *how: Any) -> TriedPoints:
-        return points_of(points, settling=1 + points[:, 0])
-
-    remedy = Remedy("", rigid, (of_key("controller.crossover", 1, 50),))
-    tried = measured(np.array([[0.0], [0.02], [0.04], [0.5], [0.6]]))
-    looks = {"measured": measured, "share": every, "clear": lambda batch: batch[:, 0] > 0.46}
-    first, *others = [float(point[0]) for point in search_of(remedy, Goal(), machines, tried, **looks).surveyed()]
-    assert 0.46 < first < 0.47
-    assert sorted([first, *others]) == [first, *others]
-    assert 0.5 in others
-
-
 def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet) -> None:
     """Held by its friction, it is in position once the reference is back: that was the fastest remedy of an axis."""
     weak = {"kind": "pid", "kp": "1 N/m", "ki": "0 N/(m*s)", "kd": "1 N*s/m", "derivative_on": "measurement"}
@@ -730,24 +655,6 @@ def test_costs_order_settings() -> None:
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "margin": [0.6, 0.6, 0.4, 0.6, 0.6]}
     points = points_of([0.0] * 5, **columns, bandwidth=[8.0] * 5, nearness=[1.0, 1.0, 1.0, 0.75, 0.25])
     assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
-
-
-def test_a_search_goes_on_while_all_points_are_as_bad(rigid: Stage, goal: Goal, machines: Fleet) -> None:
-    """If no point of a generation settled, all had the same cost, and the search was taken to have converged."""
-    gains = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "gains")
-    counts = []
-    for settling in (np.inf, 0.5):
-        tried: list[int] = []
-
-        def measured(
-            shares: np.ndarray, *how: Any, tried: list[int] = tried, settling: float = settling
-        ) -> TriedPoints:
-            tried.append(len(shares))
-            return points_of(shares, settling=np.full(len(shares), settling), nearness=np.full(len(shares), 0.5))
-
-        search_of(gains, goal, machines, measured=measured, budget=replace(TINY, generations=6, refined=1)).optimise()
-        counts.append(len(tried))
-    assert counts[0] > counts[1]
 
 
 @pytest.mark.parametrize(
@@ -826,6 +733,7 @@ def test_the_answer_changes_the_bandwidth_alone_and_is_that_so_far(tuning: Advic
     assert (way["works"], way["keys_changed"], way["doubts"]) == ("works", 1, [])
     (change,) = way["changes"]
     assert change.startswith("controller.crossover = ")
+    assert loop_bandwidth(works.stage) < tuning.goal.bandwidth_limit
     low, high = way["slowest_twentieth_interval_s"]
     assert low <= way["slowest_twentieth_s"]
     assert high is None  # of few machines
