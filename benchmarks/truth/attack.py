@@ -18,8 +18,8 @@ from benchmarks.truth.second_opinion import scipy_refutations
 from friso.engine.allowance import Exhausted, allowance
 from friso.stage import Stage
 
-WORK = 4e9
-"""Work of an attack on a claim (see `friso.engine.allowance`), about 50 s on one core: verdict, own motion, edge and
+WORK = 2e9
+"""Work of an attack on a claim (see `friso.engine.allowance`), about 25 s on one core: verdict, own motion, edge and
 margin in static friction in this order, without SciPy's. Free joints whose limiter chatters would take a hundred times
 that."""
 
