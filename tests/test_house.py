@@ -117,6 +117,7 @@ def inner_modules(path: Path) -> Iterator[str]:
                 yield module
 
 
+@pytest.mark.slow
 def test_a_module_is_a_room() -> None:
     """Half of the modules with code have 120 lines of it or more, and imports are a tenth of all (9 % are wanted)."""
     modules = {name: text for name, text in sources().items() if not name.startswith("friso_thesis")}
@@ -131,6 +132,7 @@ def test_a_module_is_a_room() -> None:
     assert imports / sum(sizes) < 0.102
 
 
+@pytest.mark.slow
 def test_a_number_that_nobody_changes_is_a_constant() -> None:
     """A setting is given another value by a test, a benchmark or a command; other numbers stand above their use."""
     users = [path for folder in ("tests", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
@@ -158,6 +160,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     assert sorter.is_active()
 
 
+@pytest.mark.slow
 def test_every_command_has_a_price_and_every_feature_begins_somewhere() -> None:
     from benchmarks import price
     from friso.cli.app import COMMANDS

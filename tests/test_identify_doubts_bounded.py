@@ -58,6 +58,7 @@ def passing(count: int, mass: float, friction: float, scale: float, odd: str, bl
     return RecordCase(log, inverse_model(log))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     st.sampled_from([1, 2, 5]),

@@ -74,6 +74,7 @@ def test_a_position_is_enough(rate: float) -> None:
         assert shown[name].value == pytest.approx(value, rel=0.05)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     truth = {MASS: 4.0, VISCOUS: 20.0, COULOMB: 5.0, OFFSET: 0.5}
     held = [
@@ -84,6 +85,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert np.mean(held) > 0.9
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.01, 100), st.floats(0.1, 10), st.floats(-1e9, 1e9))
 def test_units_and_the_origin_of_time_change_nothing(force: float, length: float, begin: float) -> None:
