@@ -1062,8 +1062,12 @@ ERROR, PAUSE, GAINS, FREEZE = range(len(WINDOWS))
 """Windows of the error in a drive. Each acts below a first error, after a time there, until a second error."""
 
 
+PUSHES = ("stiction_push", "stiction_push_window", "dither_amplitude", "dither_frequency")
+"""Forces beside those of the PID: a push from an error on, at rest, and a sine of the time since the last corner."""
+
+
 class Drive(NamedTuple):
-    """A rigid mass on LuGre friction under a PID whose derivative is that of the measurement, with windows.
+    """A rigid mass on LuGre friction under a PID whose derivative is that of the measurement, with windows and limits.
 
     `numbers` (1,) and friction (1,) are records. A window, of (4, 3), has the error at which it is entered and left
     [m], and its time [s]; a window of 0 never acts. The schedule (2, n) has places and factors of the gains.
@@ -1093,6 +1097,10 @@ def drive(flat: Flat) -> Drive:
         "at_rest": key.get("windows_at_rest", False),
         "moving": key.get("moving_factor", 1.0),
         "over_speed": "schedule_speed.1" in key,
+        "resets": key.get("integral_reset", False),
+        "leak": 2 * np.pi * key.get("integral_leak", 0.0),
+        **{name: key.get(name, np.inf) for name in ("integral_limit", "force_limit")},
+        **{name: key.get(name, 0.0) for name in PUSHES},
     }
     numbers = np.zeros(1, [(name, float) for name in values]).view(np.recarray)
     for name, value in values.items():
@@ -1149,18 +1157,29 @@ def _shares(of, inside, rests, error, speed):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _rates_of_drive(of, inside, rests, ref, y, held, sampled):  # type: ignore[no-untyped-def]
+def _demand(n, rests, t, error, acting, gains, speed, i):  # type: ignore[no-untyped-def]
+    """Return the force that the controller asks for, before its limit, and whether a limit stops its integral."""
+    force = gains * (n.kp * acting - n.kd * speed) + n.ki * i
+    if rests and abs(error) > n.stiction_push_window:
+        force += n.stiction_push if error > 0.0 else -n.stiction_push
+    force += n.dither_amplitude * np.sin(2 * np.pi * n.dither_frequency * t)
+    way = 1.0 if acting > 0 else -1.0
+    return force, n.ki * i * way > n.integral_limit or force * way > n.force_limit
+
+
+@njit(cache=True)
+def _rates_of_drive(of, inside, rests, t, ref, y, held, sampled):  # type: ignore[no-untyped-def]
     """Return the rates of position, velocity, bristle and integral."""
     n, rub, (x, v, z, i) = of.numbers[0], of.rub[0], y
     acting, gains, winds = _shares(of, inside, rests, ref - x, v)
-    force = gains * (n.kp * acting - n.kd * v) + n.ki * i
-    if inside[FREEZE] > 0.0:
-        force = 0.0
+    force, stops = _demand(n, rests, t, ref - x, acting, gains, v, i)
+    force = 0.0 if inside[FREEZE] > 0.0 else min(max(force, -n.force_limit), n.force_limit)
+    winds *= 0.0 if stops else 1.0
     if sampled:
         force, winds = held, 0.0
     z_rate = v - rub.bristle_stiffness * abs(v) / _level(rub, v, 1.0) * z
     drag = rub.bristle_stiffness * z + rub.bristle_damping * z_rate + rub.viscous * v
-    decay = n.decay * i if inside[PAUSE] > 0.0 and not sampled else 0.0
+    decay = 0.0 if sampled else n.leak * i + (n.decay * i if inside[PAUSE] > 0.0 else 0.0)
     return v, (force - drag) / n.mass, z_rate, winds * acting - decay
 
 
@@ -1176,7 +1195,7 @@ def _traced(of, pieces, start, times, step, sample):  # type: ignore[no-untyped-
     y = (start[0], start[1], start[2], start[3])
     inside, clock, sampled = np.zeros(5), np.zeros(4), sample > 0.0
     inside[4] = of.windows[0, 0]
-    piece, ticks, held, before, begun = 0, 0, 0.0, start[0], False
+    piece, ticks, held, before, begun, last = 0, 0, 0.0, start[0], False, 0.0
     out[0] = y[0]
     for number in range(1, len(times)):
         while now < times[number] - 1e-12:
@@ -1194,26 +1213,33 @@ def _traced(of, pieces, start, times, step, sample):  # type: ignore[no-untyped-
                     _enter(of, rests, error, sample, inside, clock)
                     speed = (y[0] - before) / sample
                     acting, gains, winds = _shares(of, inside, rests, error, speed)
-                    i = y[3] + sample * winds * acting
+                    added = sample * winds * acting
+                    stops = _demand(n, rests, now, error, acting, gains, speed, y[3] + added)[1]
+                    i = added if n.resets > 0.0 and last * error < 0.0 else y[3] + (0.0 if stops else added)
+                    i /= 1.0 + n.leak * sample
                     if inside[PAUSE] > 0.0:
                         i /= 1.0 + n.decay * sample
                     if inside[FREEZE] > 0.0:
                         i = 0.0
                     y = (y[0], y[1], y[2], i)
-                    held = 0.0 if inside[FREEZE] > 0.0 else gains * (n.kp * acting - n.kd * speed) + n.ki * i
-                    before = y[0]
+                    wanted = _demand(n, rests, now, error, acting, gains, speed, i)[0]
+                    held = 0.0 if inside[FREEZE] > 0.0 else min(max(wanted, -n.force_limit), n.force_limit)
+                    before, last = y[0], error
                     ticks += 1
                 end = min(end, ticks * sample)
             h = min(step, end - now)
             r0, r1 = _reference(now, p, tones)[0], _reference(now + h / 2, p, tones)[0]
             r2 = _reference(now + h, p, tones)[0]
-            k1 = _rates_of_drive(of, inside, rests, r0, y, held, sampled)
-            k2 = _rates_of_drive(of, inside, rests, r1, _moved(y, h / 2, k1), held, sampled)
-            k3 = _rates_of_drive(of, inside, rests, r1, _moved(y, h / 2, k2), held, sampled)
-            k4 = _rates_of_drive(of, inside, rests, r2, _moved(y, h, k3), held, sampled)
+            k1 = _rates_of_drive(of, inside, rests, now - p[0], r0, y, held, sampled)
+            k2 = _rates_of_drive(of, inside, rests, now + h / 2 - p[0], r1, _moved(y, h / 2, k1), held, sampled)
+            k3 = _rates_of_drive(of, inside, rests, now + h / 2 - p[0], r1, _moved(y, h / 2, k2), held, sampled)
+            k4 = _rates_of_drive(of, inside, rests, now + h - p[0], r2, _moved(y, h, k3), held, sampled)
+            error = r0 - y[0]
             y = _moved(_moved(_moved(_moved(y, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4)
             now += h
             if not sampled:
+                if n.resets > 0.0 and error * (r2 - y[0]) < 0.0:
+                    y = (y[0], y[1], y[2], 0.0)
                 froze = inside[FREEZE]
                 _enter(of, rests, r2 - y[0], h, inside, clock)
                 if inside[FREEZE] != froze:
