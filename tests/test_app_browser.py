@@ -261,6 +261,7 @@ def unchecked(chromium: Any, served: tuple[str, str]) -> Iterator[Browsed]:
         yield browsed
 
 
+@pytest.mark.slow
 def test_ask(browsed: Browsed) -> None:
     """Answers are the command's, and none stays that no longer holds; a cure is one button, and can be taken back."""
     page = browsed.page
