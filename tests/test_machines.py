@@ -85,6 +85,7 @@ def test_edges_by_brute_force(name: str, rtol: float) -> None:
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", knowing("extremes"))
 def test_a_cycle_that_leans_is_told_with_both_ends(name: str) -> None:
     """Of the pair of mirror images the one is told in which the stage's own motion ends."""

@@ -120,6 +120,7 @@ def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     assert document["highest_stable_crossover_hz"] < slow.highest_stable
 
 
+@pytest.mark.slow
 def test_compare(whole: Stage, tmp_path: Path) -> None:
     document = answer(tmp_path, whole, "compare", "--names", "own", "--machines", 20, "--seed", 1)
     assert [*document["stages"]] == ["own"]

@@ -71,6 +71,7 @@ def test_gains_are_scaled_with_the_speed() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_map_is_that_at_which_followed_cycles_cease_to_attract(
     locked: Stage, sketched: SweepAnswer
 ) -> None:

@@ -133,6 +133,7 @@ def test_settings_against_friction_leave_friso(settings: dict[str, Any]) -> None
     assert parcel.program.steps != parcel_of("van_dijk_notch", "rigid_lugre").program.steps
 
 
+@pytest.mark.slow
 def test_windows_in_a_position_loop_leave_friso() -> None:
     """They act at the samples of the slower loop, with its integral and with all that pauses or empties it."""
     own = {"windows_in_position_loop": True, "position_integral_time": "100 ms", "freeze_window": "1 um"}
@@ -243,6 +244,7 @@ def extreme_rows(parcel: Parcel, seed: int) -> list[list[float]]:
     return rows.tolist()
 
 
+@pytest.mark.cases(first=3)
 @needs_compiler
 @pytest.mark.parametrize("control", CONTROLLERS)
 def test_extreme_inputs(tmp_path: Path, control: str) -> None:
@@ -283,6 +285,7 @@ def bode_response(stage: Stage, period: int) -> Callable[[np.ndarray], np.ndarra
     return lambda turns: np.sum([controller_over_period(controls, name).over(turns)[0] for name in names], axis=0)
 
 
+@pytest.mark.cases(first=3)
 @needs_compiler
 @pytest.mark.parametrize("control", CONTROLLERS)
 def test_the_response_is_that_of_bode_plots(tmp_path: Path, control: str) -> None:
@@ -499,6 +502,7 @@ def machined(control: str, machine: str, samples: int = SHORT, **changes: Any) -
     return packed(stage, TARGETS["c"], "axis", {}, samples, plant=True)
 
 
+@pytest.mark.cases(first=2)
 @needs_compiler
 @pytest.mark.parametrize("machine", [*MACHINES, "more kinks than states"])
 def test_a_machine_in_c_is_the_one_in_python(tmp_path: Path, machine: str) -> None:
