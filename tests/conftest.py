@@ -90,6 +90,18 @@ def rig() -> Stage:
     return friso.load(Path(__file__).parent.parent / "examples" / "thesis_rig.toml")
 
 
+@pytest.fixture(scope="session")
+def locked(rig: Stage) -> Stage:
+    """The thesis rig, its joint locked."""
+    return rig.variants()["locked"]
+
+
+@pytest.fixture(scope="session")
+def built() -> Stage:
+    """The thesis rig with its drive as built."""
+    return friso.load(friso.example("thesis_drive"))
+
+
 @pytest.fixture
 def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checks search no other bandwidths than a stage's own, which takes most of their time: what they say of the stage

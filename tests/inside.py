@@ -1,6 +1,7 @@
 """The command line run in the process of the tests, which need not import everything anew."""
 
 import io
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,6 +26,11 @@ def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProces
         with pytest.raises(SystemExit) as left:
             main()
     return subprocess.CompletedProcess(command, int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+
+def strict_json(text: str) -> dict[str, Any]:
+    """A JSON document, in which infinite and undefined numbers have no place."""
+    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the document"))
 
 
 def command_of(name: str) -> Callable[..., None]:

@@ -13,12 +13,6 @@ from friso.equations.structure import structure
 from friso.stage import Stage
 
 
-@pytest.fixture(scope="module")
-def locked(rig: Stage) -> Stage:
-    """The thesis rig, its joint locked."""
-    return rig.variants()["locked"]
-
-
 def runs_of(stage: Stage, count: int) -> np.ndarray:
     """The steps that runs of a stage take, shape (count,)."""
     flat = stage.flat()

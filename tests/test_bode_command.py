@@ -1,6 +1,5 @@
 """Test `friso bode` as a user runs it: what it computes, says, draws and refuses."""
 
-import json
 import subprocess
 from collections.abc import Mapping
 from copy import copy
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from inside import command_of, friso_inside
+from inside import command_of, friso_inside, strict_json
 from pages import Page
 from snapshots import Snapshots
 
@@ -75,16 +74,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], P
     folder = tmp_path_factory.mktemp("bode")
     done = run(folder, "--json", "--out", "out", "--frequencies", "0.1 Hz..1 kHz")
     assert (done.returncode, done.stderr) == (0, "")
-    return _strict(done.stdout), folder / "out"
-
-
-def _strict(text: str) -> dict[str, Any]:
-    """A JSON document, in which infinite and undefined numbers have no place."""
-
-    def refuse(name: str) -> None:
-        raise AssertionError(f"{name} in the document")
-
-    return json.loads(text, parse_constant=refuse)
+    return strict_json(done.stdout), folder / "out"
 
 
 # ---------------------------------------------------------------- the document

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
-from inside import command_of
+from inside import command_of, strict_json
 from pages import Page
 from patched import patched
 from refusals import refused
@@ -157,15 +157,6 @@ def no_design(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(method, "design", fail)
 
 
-def _strict(text: str) -> dict[str, Any]:
-    """A JSON document, in which infinite and undefined numbers have no place."""
-
-    def refuse(name: str) -> None:
-        raise AssertionError(f"{name} in the document")
-
-    return json.loads(text, parse_constant=refuse)
-
-
 def _figures(designed: Design) -> dict[str, Figure]:
     return {figure.name: figure for figure in design_figures(designed)}
 
@@ -193,7 +184,7 @@ def test_the_document_has_the_numbers_of_the_design(
 ) -> None:
     command(RIG, spec, out=folder, as_json=True, overwrite=True)
     shown = capsys.readouterr()
-    document = _strict(shown.out)
+    document = strict_json(shown.out)
     assert shown.err == ""
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
@@ -392,7 +383,7 @@ def test_no_design_says_what_to_relax(tmp_path: Path, capsys: Any, no_design: No
     if not as_json:
         assert shown.out == ""
         return
-    document = _strict(shown.out)
+    document = strict_json(shown.out)
     assert document["feasible"] is False
     length = {"key": "leaves.length", "from": 0.07, "to": 0.07421, "unit": "m"}
     assert document["relax"][1].items() >= length.items()
@@ -434,7 +425,7 @@ def test_a_specification_that_is_not_met_is_told(
         command(RIG, spec, out=folder, as_json=True, overwrite=True)
     assert left.value.exit_code == 2
     shown = capsys.readouterr()
-    document = _strict(shown.out)
+    document = strict_json(shown.out)
     assert document["feasible"] is False
     (relax,) = document["relax"]
     assert relax["key"] == "position.settling_time"

@@ -1,6 +1,5 @@
 """`friso flexure`: its numbers against textbooks and shells, what it warns of, what it draws."""
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
-from inside import command_of
+from inside import command_of, strict_json
 from pages import Page
 from refusals import refused
 from snapshots import Snapshots
@@ -67,15 +66,10 @@ def warnings(answer: Any) -> list[str]:
     return [text for text, colour in zip(block.sentences, block.colours, strict=False) if colour != block.colours[0]]
 
 
-def strict(text: str) -> dict[str, Any]:
-    """A JSON document, in which infinite and undefined numbers have no place."""
-    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the document"))
-
-
 def test_the_document_is_that_of_the_stroke(path: Path, capsys: Any) -> None:
     command(path, stroke="500 um", as_json=True)
     shown = capsys.readouterr()
-    document = strict(shown.out)
+    document = strict_json(shown.out)
     assert shown.err == ""
     assert (document["stage"], document["failure"]) == ("Thesis rig", None)
     assert (document["model"], document["closed_forms"]["model"]) == ("beams", "closed forms")
@@ -125,7 +119,7 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
         command(path, as_json=True)
     assert leave.value.exit_code == 1
     shown = capsys.readouterr()
-    document = strict(shown.out)
+    document = strict_json(shown.out)
     assert document["model"] == "closed forms"
     assert "no equilibrium" in document["failure"]
     assert document["failure"] in " ".join(shown.err.split())

@@ -138,11 +138,6 @@ def test_landings_that_depend_on_more_than_their_distance_scatter() -> None:
     assert of_function(between).scatter == np.inf
 
 
-@pytest.fixture(scope="module")
-def locked(rig: Stage) -> Stage:
-    return rig.replace({"joint.locked": True})
-
-
 @pytest.mark.slow
 def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage) -> None:
     survey = survey_maps(Ensemble.held(locked.flat(), 1))

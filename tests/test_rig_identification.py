@@ -1,12 +1,9 @@
 """The thesis's identification on the virtual rig (Sec. 4.2): what the logs show against what the stage truly is."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from refusals import refused
 
-import friso
 from friso.progress import silent
 from friso.stage import Stage
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
@@ -15,12 +12,6 @@ from friso_thesis.studies.rig.experiments import constant_speed, frf, stiction, 
 from friso_thesis.studies.rig.outcome import rig_log
 
 PLACE = 0.02
-
-
-@pytest.fixture(scope="module")
-def built() -> Stage:
-    """The thesis rig with its drive as built."""
-    return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
 
 
 def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from refusals import refused
 
-import friso
 from friso.identification.kind import as_set_up
 from friso.identification.logs.roles import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.sources import read_all
@@ -14,11 +13,6 @@ from friso.stage import Stage
 from friso_thesis.questions.rig.blocks import write_csv
 from friso_thesis.studies.rig.experiments import constant_speed, presliding, stiction
 from friso_thesis.studies.rig.experiments.stiffness import steps
-
-
-@pytest.fixture(scope="module")
-def built() -> Stage:
-    return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
 
 
 @pytest.mark.slow

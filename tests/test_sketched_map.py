@@ -18,12 +18,6 @@ SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
 
 
 @pytest.fixture(scope="module")
-def locked(rig: Stage) -> Stage:
-    """The thesis rig, its joint locked."""
-    return rig.variants()["locked"]
-
-
-@pytest.fixture(scope="module")
 def sketched(locked: Stage) -> SweepAnswer:
     """A map of verdicts over both scalings, as `friso map` makes it."""
     return friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]})
