@@ -64,7 +64,7 @@ def machine(settings: dict[str, Any], how: str = MOVE) -> Stage:
     return plain.replace({f"controller.{key}": value for key, value in settings.items()})
 
 
-@pytest.mark.cases(first=26)
+@pytest.mark.cases(first=14)
 @pytest.mark.parametrize(
     ("name", "how"), [(name, how) for name in WINDOWS for how in MOTIONS if (name, how) != ("dither", "move")]
 )
@@ -76,7 +76,7 @@ def test_a_trace_against_equations_by_hand(name: str, how: str) -> None:
     assert np.abs(ours["position"].values - theirs).max() < 2e-6
 
 
-@pytest.mark.cases(first=13)
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize("name", WINDOWS)
 def test_each_window_makes_a_difference(name: str) -> None:
     settled, plain = (
@@ -85,7 +85,7 @@ def test_each_window_makes_a_difference(name: str) -> None:
     assert np.abs(settled - plain).max() > 2e-5
 
 
-@pytest.mark.cases(first=13)
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize("name", WINDOWS)
 def test_a_drive_against_difference_equations_by_hand(name: str) -> None:
     sample = 5e-4
