@@ -108,7 +108,6 @@ class FakeCase:
     solver: Any = field(default_factory=lambda: fake_solver("done"))
     unstable: tuple[str, ...] = ()
     unstable_bandwidths: tuple[Any, ...] = ()
-    unstable_as_built: tuple[str, ...] = ()
     breakaway: float = 3.0
     force_limit: float | None = None
     unmoved: bool = False

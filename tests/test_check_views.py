@@ -54,7 +54,6 @@ from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.motion_words import ShownCase, shown_cases
-from friso.shown.text import UNSTABLE_AS_BUILT
 from friso.stage import Stage
 
 # ---------------------------------------------------------------- figures of a check
@@ -218,7 +217,7 @@ def sentence(judgement: Judgement, cases: Any = None, **changes: Any) -> str:
     faster, slower = advised(case.stage, judgement, case.unstable_bandwidths, None, 0.0)
     item, cases = ShownCase("given", "As given", "#000000", replace(case, faster=faster, slower=slower)), cases or {}
     says = verdict_sentence(item, {"given": case, **cases})
-    assert len(re.findall(r"\.(?= [A-Z]|$)", says)) <= 3 + bool(case.unstable or case.unstable_as_built)
+    assert len(re.findall(r"\.(?= [A-Z]|$)", says)) <= 3 + bool(case.unstable)
     return " ".join([says, *details_sentences(item, {"given": case, **cases})])
 
 
@@ -275,7 +274,6 @@ def made_cases() -> dict[str, Said]:
     still = settles(verdict="transient", settled_after=None, followed=1e3)
     seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True, lasting=1.04e-3, followed=1e3)
     some = hunts(verdict="bistable", push=none, moves=None, given_up=(CheckPart.STARTS,))
-    undelayed = settles(hunting=replace(fake_hunting(), certain=False, reason=UNSTABLE_AS_BUILT))
     restless = settles(verdict="transient", hunting=UNCERTAIN, settled_after=None)
     leaking, ramp, flat = fake_stage(), fake_stage(), fake_stage().flat()
     leaking.flat = lambda: {**flat, "controller.integral_leak": 0.05}
@@ -348,8 +346,6 @@ def made_cases() -> dict[str, Said]:
         "transient, longer run given up": (replace(still, followed=None), {"peak_to_peak": 1e-7}),
         "transient, cannot hunt": (cannot_hunt("transient"), {"peak_to_peak": 0.383, "period": 6.36}),
         "settles": settles(),
-        "settles, unstable as built": (undelayed, {"unstable_as_built": BOTH}),
-        "settles, uncertain and unstable": (settles(hunting=UNCERTAIN), {"unstable_as_built": ("sticks",)}),
         "settles, repels": settles(hunting=REPELS),
         "settles, no margin": settles(margin=None),
         "settles, gains": settles(margin=Margin(0.5, None, True, 0.5047)),

@@ -29,7 +29,7 @@ def case(
     hunting = SimpleNamespace(certain=certain, target=cycle, reason="")
     said = {"given_up": given_up, "observed": False, "windows": ()}
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, **said)
-    loop = {"runs_away": False, "unstable": (), "unstable_as_built": (), "stick_slip": None}
+    loop = {"runs_away": False, "unstable": (), "stick_slip": None}
     return SimpleNamespace(verdict=verdict, judgement=judgement, **loop)
 
 

@@ -32,6 +32,7 @@ from friso.frequency.loops import RATED, STAGE, controller_over_period, samples_
 from friso.questions.export.parcel import packed, verdict_line
 from friso.stage import Stage
 from friso.virtual_rig.run import as_built_keys
+from friso.virtual_rig.verdict import Built
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-O1", "-fsanitize=undefined")
 TRAPS = {"gcc": "-fsanitize-undefined-trap-on-error", "clang": "-fsanitize-trap=undefined"}
@@ -382,9 +383,13 @@ def check_of(verdict: str, **more: Any) -> Any:
     hunting = SimpleNamespace(certain=more.pop("certain", True), reason=more.pop("reason", ""))
     case = SimpleNamespace(judgement=SimpleNamespace(hunting=hunting), verdict=verdict)
     stage = stage_of("adrc", "rigid_lugre")
-    return SimpleNamespace(
-        **{"result": {"given": case}, "verdict": verdict, "stage": stage, "failure": "", "varied": (), **more}
-    )
+    answer = {"result": {"given": case}, "verdict": verdict, "stage": stage, "failure": "", "varied": ()}
+    return SimpleNamespace(**{**answer, "as_built": None, **more})
+
+
+def as_built(verdict: Any, certain: bool) -> Built:
+    one = (1.0, 1.0)
+    return Built(verdict, certain, one, one, {"hunts": 1}, {}, None, None, 1.0, None)
 
 
 WARNS = {"settles": False, "transient": False} | dict.fromkeys(
@@ -401,6 +406,9 @@ RIGID = friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None}
         (check_of("settles", failure="the run stopped"), True),
         (check_of("settles", stage=SimpleNamespace(states_friction=False, unknown_keys=())), True),
         (check_of("settles", stage=RIGID), False),
+        (check_of("settles", as_built=as_built("hunts", True)), True),
+        (check_of("settles", as_built=as_built("settles", False)), True),
+        (check_of("hunts", as_built=as_built("toggles", True)), False),
     ],
 )
 def test_only_a_sure_verdict_leaves_without_a_warning(check: Any, warns: bool) -> None:
@@ -430,7 +438,7 @@ def test_what_is_written_stands_in_the_header(tmp_path: Path) -> None:
     document = json.loads(done.stdout)
     header = (tmp_path / "out" / "twincat_cascade.h").read_text("utf-8")
     digest = hashlib.sha256(friso.load(stage).to_toml().encode()).hexdigest()
-    for part in (digest, friso.__version__, "Verdict: the stage does not hunt", "there_and_back", "[A]"):
+    for part in (digest, friso.__version__, "Verdict: as built, the stage settles", "there_and_back", "[A]"):
         assert part in header
     assert document["output_unit"] == "A"
     assert document["sure_not_to_hunt"] is True

@@ -67,6 +67,7 @@ NEUTRAL: Mapping[str, float] = {
     "drive.delay": 0.0,
     "drive.encoder_resolution": 0.0,
     "drive.encoder_noise": 0.0,
+    "drive.force_resolution": 0.0,
     "drive.motor_constant_ratio": 1.0,
     "drive.feedforward_mass": 0.0,
     "drive.feedforward_coulomb": 0.0,
@@ -150,13 +151,14 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
     from sympy import pi
 
     from friso.equations.blocks import Controller, force_limit
-    from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
+    from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, quantised, state
     from friso.equations.model import loop_stiffness
     from friso.equations.sampled import clipped
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         loops.append(loop)
-        reading, command, sampled = _command(form, loop)
+        reading, exact, sampled = _command(form, loop)
+        command: Any = quantised(exact, key("drive.force_resolution"))
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
         controller = form.structure.controller
         begun: Any = clipped(STEADY.force, force_limit()) if controller and controller.anti_windup else STEADY.force

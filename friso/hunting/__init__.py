@@ -41,7 +41,7 @@ from friso.hunting.many_stages import (
     sketch_attractors,
 )
 from friso.hunting.margin import Margin, find_margin
-from friso.hunting.motions import Motions, rests_off
+from friso.hunting.motions import Motions, resting, rests_off
 from friso.hunting.path import MORE_WORK, SEARCH_LIMITS, AttractionEnd, BandwidthWindow, LossKind
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.stage_margins import BandwidthAdvice, ParameterMargin, advised, joint_margins
@@ -132,6 +132,7 @@ __all__ = [
     "needed_kernels",
     "plane",
     "pushes_that_hunt",
+    "resting",
     "rests_off",
     "sketch_attractors",
     "stuck",

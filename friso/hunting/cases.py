@@ -69,7 +69,6 @@ class Case:
     - `force_limit` [N]: the controller's limit, if it holds the stage off its reference (None: it does not).
     - `unstable`: states in which the loop is unstable regardless of friction (see `friso.hunting.loop`).
     - `unstable_bandwidths`: bandwidths at which it is so, for a stage that may hunt.
-    - `unstable_as_built`: states in which only sampling and delay make it unstable.
     - `feeding`: with a backlash, the cause without which hunting ends (None also if the search took too much work).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
     - `faster`, `slower`: bandwidths advised to a stage that hunts, or that settles close to hunting (None: no advice).
@@ -96,7 +95,6 @@ class Case:
     force_limit: float | None = None
     unstable: tuple[LoopState, ...] = ()
     unstable_bandwidths: tuple[BandwidthWindow, ...] = ()
-    unstable_as_built: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
     faster: BandwidthAdvice | None = None

@@ -14,7 +14,7 @@ from friso.axis import axis_shown, unit_shown
 from friso.equations.motion import initial_displacement, reference, rests
 from friso.hunting import MORE_WORK, Case, Dwell, StickSlipSpeeds, Tracking
 from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION
-from friso.shown.text import UNSTABLE_AS_BUILT, after_loop, listed, with_unit
+from friso.shown.text import after_loop, listed, with_unit
 from friso.stage import Stage
 from friso.stage.rig import motion_of
 
@@ -128,18 +128,12 @@ def band_text(band: float) -> str:
 def verdict_in_short(case: Case) -> str:
     """Write the verdict as tables, pages and documents show it: how the loop is unstable, then what the stage does."""
     does = "" if swings_by_its_loop(case) else _does(case)
-    return after_loop(does, case.unstable, case.unstable_as_built)
+    return after_loop(does, case.unstable)
 
 
 def swings_by_its_loop(case: Case) -> bool:
     """Tell whether a stage does not come to rest because its loop is unstable, without a cycle that was found."""
     return bool(case.unstable) and case.verdict in ("transient", "undecided")
-
-
-def in_doubt(case: Case) -> bool:
-    """Tell whether the verdict is not certain for another reason than what the drive does to the loop."""
-    hunting = case.judgement.hunting
-    return not hunting.certain and hunting.reason != UNSTABLE_AS_BUILT
 
 
 def _does(case: Case) -> str:
@@ -148,7 +142,7 @@ def _does(case: Case) -> str:
         return "runs away"
     if case.verdict == "none":
         return (case.stick_slip and stick_slip_in_short(case.stick_slip)) or "no verdict: its reference keeps moving"
-    return f"{case.verdict}{' (not certain)' if in_doubt(case) else ''}"
+    return f"{case.verdict}{'' if case.judgement.hunting.certain else ' (not certain)'}"
 
 
 @dataclass(frozen=True)

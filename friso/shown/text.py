@@ -24,6 +24,7 @@ from friso.shown.drawing.figure import Array
 from friso.stage import Stage
 from friso.stage.contacts import followed
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
+from friso.stage.rig import is_as_built
 from friso.stage.tables import friction_laws
 
 if TYPE_CHECKING:
@@ -226,10 +227,6 @@ def key_in_words(key: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
-"""Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
-
-
 def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
     """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
     if not any(key.startswith("drive.") for key in stage.flat()):
@@ -257,7 +254,7 @@ def unstable_where(states: tuple[LoopState, ...]) -> str:
     return f"unstable {where}, whatever the friction: retune the controller (friso bode)"
 
 
-def after_loop(does: str, unstable: tuple[LoopState, ...], as_built: tuple[LoopState, ...]) -> str:
+def after_loop(does: str, unstable: tuple[LoopState, ...], as_built: tuple[LoopState, ...] = ()) -> str:
     """Say in the fewest words that a loop is unstable, itself or with its drive, and what the stage `does` then.
 
     A state is named if the loop is stable in the other one.
@@ -333,5 +330,8 @@ def unknown_condition(stage: Stage | None, varied: Collection[str] = ()) -> str:
 
 
 def if_so(stage: Stage) -> str:
-    """Return ", if so" for a stage with unknown values, to stand behind the name of a case; "" for another."""
-    return ", if so" if stage.assumed_keys else ""
+    """Return what stands behind the name of a case: that it is in continuous time, or holds if values are so.
+
+    The first is said of a stage with a drive, the second of one with unknown values.
+    """
+    return f"{', in continuous time' * is_as_built(stage)}{', if so' * bool(stage.assumed_keys)}"

@@ -200,9 +200,8 @@ def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
     left = [name for name in tables if getattr(stage, name) and not (name == "rail" and placed)]
     if not left:
         return ""
-    bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
     listed, verb = ", ".join(f"[{name}]" for name in left), "are" if len(left) > 1 else "is"
-    return f"{listed} {verb} left out: friso simulate and friso rig run the machine as built{bode}"
+    return f"{listed} {verb} left out, as in continuous time; friso check and friso simulate run the machine as built"
 
 
 IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]
@@ -276,6 +275,8 @@ class Drive(UncertainSection):
     """Rule for filters, and for the controller's own low-pass (which prewarping does not change); default: bilinear."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
     """Bandwidth of the current loop, a first-order lag between the controller's force and the actuator's."""
+    force_resolution: Annotated[Value | None, Quantity("N", positive, "10 mN")] = None
+    """Smallest step of the commanded force: that of the current, times the motor constant; default: none."""
     encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None
     encoder_noise: Annotated[Value | None, Quantity("m", non_negative, "0.5 nm")] = None
     """RMS of the encoder noise, independent from sample to sample."""

@@ -296,7 +296,6 @@ def case_document(case: hunting.Case) -> dict[str, Any]:
         **entries(judgement, "observed", "given_up"),
         "loop_unstable_while_it": case.unstable,
         "loop_unstable_bandwidths": _bandwidths(case.unstable_bandwidths),
-        **({"loop_unstable_as_built_while_it": case.unstable_as_built} if case.unstable_as_built else {}),
         **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
         **({"dwells": dwells_document(case.dwells)} if case.dwells else {}),
         **({"tracking": tracking_document(case.tracking)} if case.tracking else {}),

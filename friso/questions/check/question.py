@@ -22,6 +22,7 @@ from friso.interface.inputs import LOGGER, Changes, LengthLike, Seed, StageLike,
 from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import NOTHING
+from friso.questions.check.built_words import built_document, built_sentences
 from friso.questions.check.cases import case_document, peaks_shown, rows, rows_behind
 from friso.questions.check.draws import (
     draws_colours,
@@ -36,11 +37,11 @@ from friso.questions.check.margin_words import isolator_document, isolator_sente
 from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
 from friso.shown.blocks import AnswerBlock, Files
 from friso.shown.documents import plain_json
-from friso.shown.motion_words import case_labels, motion_sentences, shown_cases
-from friso.shown.text import range_with_unit, with_unit
+from friso.shown.motion_words import COLOURS, case_labels, motion_sentences, shown_cases
+from friso.shown.text import if_so, range_with_unit, with_unit
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
-from friso.stage.rig import left_out
+from friso.stage.rig import is_as_built, left_out
 from friso.stage.tables import passive_where
 from friso.studies.draws import TRIAL_DRAWS, Draws, FrictionLevels
 
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from friso.remedies.catalogue import Suggestion
     from friso.shown.drawing.figure import Figure
     from friso.studies.laws import VerdictsByLaw
+    from friso.virtual_rig.verdict import Built
 
 
 SHARES_OF_LEVELS = (0.05, 0.5)
@@ -83,7 +85,8 @@ class CheckAnswer(Answer):
     """The verdict on a stage.
 
     `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` are the results on machines
-    drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some machines undrawn. `laws` holds the verdicts
+    drawn from uncertain keys, or None. `as_built` is the verdict on the stage with its drive, or None if the file
+    describes none. `cut` is true if Ctrl-C left some machines undrawn. `laws` holds the verdicts
     under all friction laws, or None.
     """
 
@@ -92,6 +95,7 @@ class CheckAnswer(Answer):
     laws: VerdictsByLaw | None
     cut: bool
     stage_file: str = ""
+    as_built: Built | None = None
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that says what stops the hunting, for a file of a stage that hunts."""
@@ -132,11 +136,12 @@ class CheckAnswer(Answer):
 
     @property
     def verdict(self) -> str:
-        """Return the verdict on the stage as given.
+        """Return the verdict on the stage as given, as built if it has a drive.
 
-        It is "hunts", "bistable", "transient", "settles", "failed", or "none" while the reference keeps moving.
+        It is "hunts", "bistable", "transient", "settles", "failed", or "none" while the reference keeps moving. A stage
+        as built may also be "undecided", or it "toggles": it swings by at most a count of its encoder.
         """
-        return self.result["given"].verdict
+        return self.as_built.verdict if self.as_built else self.result["given"].verdict
 
     @property
     def failure(self) -> str:
@@ -217,7 +222,8 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
-    chosen, tolerance = inputs.read_stage(stage, set, uncertain_too=True), inputs.tolerance_of(rtol)
+    chosen = inputs.read_stage(stage, set, leaves_out=(), uncertain_too=True)
+    tolerance = inputs.tolerance_of(rtol)
     correlations, file = inputs.correlations_of(stage, chosen), inputs.file_of(stage, set)
     chosen = inputs.with_tolerance(chosen, within)
     return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file)
@@ -258,7 +264,11 @@ def checked_stage(
     kernels(needed_kernels(chosen))
     inputs.mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
-    cases = {name: _as_built(case) for name, case in cases.items()}
+    built = None
+    if is_as_built(chosen):
+        from friso.virtual_rig.verdict import judge_as_built
+
+        built = judge_as_built(cases["given"])
     drawn = across = None
     cut = False
     if uncertain is not None and cases["given"].unstable:
@@ -281,23 +291,7 @@ def checked_stage(
         from friso.studies.laws import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
-    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut, stage_file=stage_file)
-
-
-def _as_built(case: Case) -> Case:
-    """Return a case of the check, with its loop judged also as the sampled drive runs it.
-
-    If samples and delays of the drive make this loop unstable, the verdict becomes uncertain.
-    """
-    from friso.shown.text import UNSTABLE_AS_BUILT, lost_as_built
-
-    where = lost_as_built(case.stage)
-    if not where:
-        return case
-    own = case.judgement.hunting
-    reason = UNSTABLE_AS_BUILT if own.certain else f"{own.reason}; {UNSTABLE_AS_BUILT}"
-    hunting = replace(own, certain=False, reason=reason)
-    return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
+    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut, stage_file=stage_file, as_built=built)
 
 
 def _as_drawn(case: Case, draws: Draws, name: str) -> Case:
@@ -317,7 +311,7 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
     from friso.shown.motion_words import case_labels
 
     if name in (labels := case_labels(stage)):
-        LOGGER.info(f"{labels[name]}: {IN_SHORT[verdict]}", extra={"meanwhile": True})
+        LOGGER.info(f"{labels[name]}{if_so(stage)}: {IN_SHORT[verdict]}", extra={"meanwhile": True})
 
 
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
@@ -349,7 +343,7 @@ def basis(check: CheckAnswer) -> str:
 def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     """Yield the blocks: first the verdicts, over all machines drawn where there are any, else on the stage as it is."""
     stage, cases, draws = check.stage, shown_cases(check.result), check.draws
-    omitted = left_out(stage)
+    omitted = "" if check.as_built else left_out(stage)
     at_centre = AnswerBlock(
         title=f"{stage.name or 'The stage'}, at the centre of its ranges" if draws else stage.name,
         columns=cases,
@@ -360,6 +354,12 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     )
     notes = filter(None, [stage.controller.note(stage.flat()), stage.note])
     says, colours = [*_verdicts(check), *motion_sentences(stage), *notes], [item.colour for item in cases]
+    if built := check.as_built:
+        yield AnswerBlock(
+            sentences=built_sentences(built),
+            colours=[COLOURS["given"]],
+            numbers=lambda: _built_document(built, check.result["given"]),
+        )
     if draws:
         yield AnswerBlock(sentences=says, colours=[] if check.cut else draws_colours(draws))
         yield at_centre
@@ -425,6 +425,12 @@ def _figures(check: CheckAnswer) -> Sequence[Figure]:
     from friso.questions.check.figures import check_figures  # 0.7 s to import
 
     return check_figures(check.traced)
+
+
+def _built_document(built: Built, given: Case) -> dict[str, Any]:
+    """Return the verdict as built beside that in continuous time."""
+    continuous = {"verdict": given.verdict, "certain": given.judgement.hunting.certain}
+    return plain_json({"as_built": built_document(built), "continuous": continuous})
 
 
 def _cases_document(check: CheckAnswer) -> dict[str, Any]:

@@ -27,7 +27,6 @@ from friso.shown.motion_words import (
     band_text,
     dwell_sentences,
     following_sentence,
-    in_doubt,
     shown_cases,
     stick_slip_sentences,
     swings_by_its_loop,
@@ -94,9 +93,8 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _friction_has_no_say(case: Case) -> bool:
-    """Tell whether hunting by friction is no question: the loop, alone or with its drive, or the run decide first."""
-    looped = swings_by_its_loop(case) or bool(case.unstable_as_built)
-    return looped or case.runs_away or case.verdict not in _SAYS
+    """Tell whether hunting by friction is no question: the loop, or the run, decides first."""
+    return swings_by_its_loop(case) or case.runs_away or case.verdict not in _SAYS
 
 
 def details_sentences(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
@@ -133,14 +131,10 @@ def _verdict(case: Case) -> list[str]:
 def _after_loop(case: Case, sentences: str) -> str:
     """Say in which states the loop is unstable, whatever the friction, before what else is said of the stage.
 
-    A loop that only samples and delays of the drive make unstable is described as such. Returns `sentences` alone for a
-    stable loop.
+    Returns `sentences` alone for a stable loop.
     """
     if case.unstable:
         return f"the loop is {unstable_where(case.unstable)}. {sentences[:1].upper()}{sentences[1:]}"
-    if built := case.unstable_as_built:
-        drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}"
-        return f"{drive}. Without them: {sentences}"
     return sentences
 
 
@@ -407,7 +401,8 @@ def _small_swing(case: Case) -> str:
 
 def _doubt_of(case: Case) -> str:
     """Say why the verdict is not certain, as the end of its sentence; empty if it is certain."""
-    return f" (not certain: {case.judgement.hunting.reason})" if in_doubt(case) else ""
+    hunting = case.judgement.hunting
+    return "" if hunting.certain else f" (not certain: {hunting.reason})"
 
 
 def _running_away(case: Case) -> str:

@@ -41,6 +41,7 @@ from friso.errors import InputError
 from friso.hunting.criteria import ATTRACTED, UNDECIDED
 from friso.interface.answer import Answer
 from friso.progress import Progress
+from friso.questions.check.built_words import does_as_built
 from friso.questions.check.question import CheckAnswer, checked_stage
 from friso.questions.check.words import IN_SHORT
 from friso.shown.blocks import AnswerBlock, Files
@@ -90,6 +91,8 @@ def verdict_words(check: CheckAnswer) -> tuple[str, bool]:
         return f"there is no verdict: {check.failure or 'the run was not completed'}", False
     if verdict == "none":
         return "there is no verdict: the reference keeps moving", False
+    if built := check.as_built:
+        return f"as built, the stage {does_as_built(built)}", built.certain and built.verdict in ("settles", "toggles")
     if verdict in UNDECIDED or not hunting.certain:
         leaning = f"; it {IN_SHORT[verdict]}, as far as was seen" if verdict in IN_SHORT else ""
         return f"the verdict is uncertain ({hunting.reason or 'where its motion ends'}){leaning}", False

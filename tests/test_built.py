@@ -1,0 +1,61 @@
+"""The verdict on a machine as built: counts, samples and delays decide, and what is left out shows it."""
+
+import numpy as np
+import pytest
+from book import BOOK
+
+import friso
+from friso.hunting import check_given
+from friso.virtual_rig.run import as_built_keys, run_flat
+from friso.virtual_rig.task import motion_task
+from friso.virtual_rig.verdict import PLACES, Built, judge_as_built
+
+DRIVE = {"sample_time": "2 ms", "delay": "2 ms", "encoder_resolution": "1.5 mrad"}
+COUNTS = BOOK["small joint"].replace({"drive": DRIVE})
+"""A joint whose integral never stops, as its target lies between two counts. Without them it settles."""
+
+
+def built(changes: dict[str, object]) -> Built:
+    judged = judge_as_built(check_given(COUNTS.replace(changes)))
+    assert judged
+    return judged
+
+
+def test_a_target_between_two_counts_makes_a_machine_hunt() -> None:
+    answer = friso.check(COUNTS)
+    document = answer.to_dict()
+    assert answer.verdict == document["as_built"]["verdict"] == "hunts"
+    assert document["continuous"] == {"verdict": "settles", "certain": True}
+    assert document["as_built"]["because"] == ["the counts of its encoder"]
+    assert document["as_built"]["moves"] == {"hunts": PLACES}
+    assert "without the counts of its encoder it would not" in answer.sentences()[0]
+
+
+def test_its_swing_is_that_of_a_long_run() -> None:
+    judged, flat = built({}), as_built_keys(COUNTS.replace({"motion.duration": "2000 s"}))
+    (run,) = run_flat(flat, None, motion_task(flat, 1), [0], 0.02)
+    late = run.true["position"][0, run.time > 1000]
+    above = late > (late.max() + late.min()) / 2
+    assert judged.amplitude
+    assert judged.period
+    assert judged.amplitude[0] * 0.95 <= np.ptp(late) / 2 <= judged.amplitude[1] * 1.05
+    assert judged.period[0] <= 1000 / np.count_nonzero(np.diff(above.astype(int)) > 0) <= judged.period[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict", "because"),
+    [
+        ({"drive.encoder_resolution": "0.2 mrad", "friction.bristle_stiffness": "40 N*m/rad"}, "toggles", ()),
+        ({"drive.encoder_resolution": "0.1 mrad", "drive.integrator_deadband": "0.3 mrad"}, "settles", ()),
+        ({"drive.encoder_resolution": "1 urad", "drive.delay": "60 ms"}, "hunts", ("its delay",)),
+        ({"controller.ki": "60 N*m/(rad*s)"}, "hunts", ()),
+        (
+            {"controller.ki": "20 N*m/(rad*s)", "drive.integrator_deadband": "20 mrad"},
+            "settles",
+            ("the dead band of its integral",),
+        ),
+    ],
+)
+def test_what_alone_makes_it_differ(changes: dict[str, object], verdict: str, because: tuple[str, ...]) -> None:
+    judged = built(changes)
+    assert (judged.verdict, judged.certain, judged.because) == (verdict, True, because)
