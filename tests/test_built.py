@@ -59,3 +59,27 @@ def test_its_swing_is_that_of_a_long_run() -> None:
 def test_what_alone_makes_it_differ(changes: dict[str, object], verdict: str, because: tuple[str, ...]) -> None:
     judged = built(changes)
     assert (judged.verdict, judged.certain, judged.because) == (verdict, True, because)
+
+
+@pytest.mark.parametrize(
+    ("changes", "moves"),
+    [
+        ({"drive.encoder_noise": "0.1 mrad"}, {"hunts", "rests", "open"}),
+        ({"motion.duration": "10 ms"}, {"hunts"}),
+        ({"motion.duration": "100000 s"}, {"hunts", "open"}),
+        ({"controller.force_limit": "0.05 N*m"}, {"rests"}),
+    ],
+    ids=["noise", "a run of five samples", "a run of years", "a motor that cannot break it away"],
+)
+def test_runs_are_followed_however_long_their_motion(changes: dict[str, object], moves: set[str]) -> None:
+    """A motor too weak to break the stage away winds up, but never makes it slip."""
+    judged = built(changes)
+    assert {*judged.moves} <= moves
+    assert judged.certain == (len(moves) == 1)
+
+
+def test_a_stage_that_hunts_at_some_places_alone_is_not_certain() -> None:
+    """Whether it hunts then depends on where its target lies between two counts."""
+    judged = built({"drive.encoder_resolution": "0.75 mrad"})
+    assert {"hunts", "rests"} <= {*judged.moves}
+    assert not judged.certain

@@ -20,6 +20,7 @@ from friso.hunting import Case, LoopState, resting
 from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.hunting.measures import LAST_HALF, LAST_QUARTER
 from friso.shown.text import lost_as_built
+from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.rig import Floor, is_as_built
 from friso.virtual_rig.run import as_built_keys, run_flat, with_complete_drive
 from friso.virtual_rig.task import MoveTask, motion_task
@@ -37,7 +38,7 @@ class Built:
 
     - `verdict`: "hunts", "bistable", "toggles" (it swings by at most a count), "settles", "undecided" or "failed" (its
       run did, or it runs away).
-    - `certain`: every run was followed until it rested, or surely did not.
+    - `certain`: every run was followed until it rested, or surely did not, and none rests of a stage that "hunts".
     - `amplitude` [m], `period` [s]: least and largest of the runs that swing, (2,) each; None if none does.
     - `moves`, `kicks`: how many of the runs have each `Fate`.
     - `smallest_kick`, `runs_away_after` [m]: smallest displacement tried that starts hunting, or after which the stage
@@ -102,11 +103,13 @@ def judge_as_built(case: Case) -> Built | None:
     flat = as_built_keys(stage)
     size = _size_of_rest(flat)
     task, kicks = _task(flat, size, case)
-    runs = _follow(flat, stage.floor, task, size, case.breakaway, SAMPLES)
+    breakaway = case.breakaway if _largest_force(flat) >= case.breakaway else np.inf
+    runs = _follow(flat, stage.floor, task, size, breakaway, SAMPLES)
     moves, kicked = runs.fate[:PLACES], runs.fate[PLACES:]
     swings = runs.fate == ("hunts" if "hunts" in runs.fate else "toggles")
     winding = runs.slips_after[(runs.fate == "rests") & np.isfinite(runs.slips_after)]
-    sure = moves[0] == "hunts" or not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
+    followed = not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
+    sure = (moves == "hunts").all() or (followed and moves[0] != "hunts")
     built = Built(
         verdict=_verdict(moves, kicked),
         certain=not stage.doubt and bool(sure),
@@ -116,7 +119,7 @@ def judge_as_built(case: Case) -> Built | None:
         kicks=_counted(kicked),
         smallest_kick=_smallest(kicks[kicked == "hunts"]),
         runs_away_after=_smallest(kicks[kicked == "runs away"]),
-        followed=float(np.nanmax(runs.followed)),
+        followed=float(np.nanmax(runs.followed, initial=0.0)),
         slips_after=_smallest(winding),
         unstable=lost_as_built(stage),
     )
@@ -129,14 +132,27 @@ def judge_as_built(case: Case) -> Built | None:
         unlike = PLACES + np.argsort(far)
     one = replace(task.of_runs(unlike[:1]), duration=float(task.pieces[0, -1, 0] + runs.followed[unlike[0]]))
     swing = case.judgement.swing.amplitude if attracted and case.judgement.swing else float(runs.swing[unlike[0]]) / 2
-    because = _reasons(flat, stage.floor, one, size, case.breakaway, QUIET_SHARE * swing, attracted)
+    because = _reasons(flat, stage.floor, one, size, breakaway, int(unlike[0]), QUIET_SHARE * swing, attracted)
     return replace(built, differs=True, because=because)
 
 
+def _largest_force(flat: Mapping[str, Any]) -> float:
+    """Return the largest force [N] that the motor exerts, wherever it stands; inf without a limit."""
+    motor = flat["drive.motor_constant_ratio"] * (1 + abs(flat.get("drive.ripple", 0.0)))
+    return float(flat.get(FORCE_LIMIT, np.inf) * motor)
+
+
 def _size_of_rest(flat: Mapping[str, Any]) -> float:
-    """Return the largest swing [m], peak to peak, that is no hunting: a count and the noise, as far as a drive sees."""
-    seen = flat["drive.encoder_resolution"] + NOISE_WIDTH * flat["drive.encoder_noise"]
+    """Return the largest swing [m], peak to peak, that is no hunting.
+
+    It is a count and the noise, as a drive sees no less, or the deviation at which a controller exerts no force.
+    """
+    seen = COUNT * flat["drive.encoder_resolution"] + NOISE_WIDTH * flat["drive.encoder_noise"]
     return max(float(seen), float(resting(flat)[0]))
+
+
+COUNT = 1.1  # [counts]
+"""Largest swing, peak to peak, that is told to be of one count: as a reading flips, a stage goes on a little."""
 
 
 NOISE_WIDTH = 10.0  # [RMS]
@@ -174,19 +190,32 @@ def _follow(
     count, step = len(task.pieces), float(np.min(flat["drive.sample_time"]))
     corner = float(np.max(task.pieces[:, -1, 0]))
     runs = _Runs(np.full(count, "open", object), *(np.full(count, np.nan) for _ in range(4)))
-    left, after = np.arange(count), task.duration - corner
-    if count * task.duration > samples * step:
-        after = max(samples * step / FIRST_SHARE / count - corner, after / LONGER**2)
-    while left.size and (affordable := int(samples * step / (corner + after)) // TOGETHER * TOGETHER):
+    left, after = np.arange(count), max(task.duration - corner, FEWEST_SAMPLES * step, corner / LONGEST_MOTION)
+    if count * (corner + after) > samples * step:
+        least = min(after / LONGER**2, samples * step / TOGETHER - corner)
+        after = max(samples * step / FIRST_SHARE / count - corner, least)
+    while left.size and after > 0 and (affordable := int(samples * step / (corner + after)) // TOGETHER * TOGETHER):
         left = left[:affordable]
         part = {key: value[left] if np.ndim(value) else value for key, value in flat.items()}
-        some = _of(part, floor, replace(task.of_runs(left), duration=corner + after), size, breakaway)
+        some = _of(part, floor, replace(task.of_runs(left), duration=corner + after), size, breakaway, left)
         for name, column in vars(runs).items():
             column[left] = getattr(some, name)
         samples -= -(-left.size // TOGETHER) * TOGETHER * (corner + after) / step
-        after *= LONGER
-        left = left[(some.fate == "open") | ((some.fate == "rests") & (some.slips_after < after))]
+        undecided = some.fate == "open"
+        left = left[undecided | np.isfinite(some.slips_after)]
+        slip = 0.0 if undecided.any() else SLIPS_FOLLOWED * float(np.min(some.slips_after))
+        after = max(LONGER * after, slip)
     return runs
+
+
+FEWEST_SAMPLES = 1000
+"""Fewest samples after a motion from which its end is judged. Between fewer, a loop hardly settles."""
+
+LONGEST_MOTION = 20.0
+"""Duration of a motion in times after it from which its end is judged, at most."""
+
+SLIPS_FOLLOWED = 2.0
+"""Factor by which a run at rest is followed beyond the time at which its winding force should break it away."""
 
 
 TOGETHER = 8
@@ -202,19 +231,32 @@ SLOWEST_SLIP = 86400.0  # [s]
 JUDGED_PERIODS = 3.0
 """Periods of a swing in the last half of a run that show that it lasts."""
 
-LASTING_SHARE = 0.8
-"""Least ratio of the swing over the last quarter of a run to that over the last half, for it to last."""
+LASTING_SHARE, SMALL_LASTING_SHARE = 0.8, 0.95
+"""Least ratio of the swing over the last quarter of a run to that over the last half, for it to last.
+
+A swing of few counts changes its size with each count, so that one that dies is told from one that lasts by the
+second."""
+
+SMALL_SWING = 3.0  # [largest swing of a stage at rest]
+"""Largest swing that is small."""
 
 
-def _of(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, size: float, breakaway: float) -> _Runs:
-    """Run a task once, and say what each run does in the end."""
+def _of(
+    flat: Mapping[str, Any],
+    floor: Floor | None,
+    task: MoveTask,
+    size: float,
+    breakaway: float,
+    seeds: np.ndarray,
+) -> _Runs:
+    """Run a task once, with these seeds of its noise, (runs,), and say what each run does in the end."""
     count, step, corner = (
         len(task.pieces),
         float(np.min(flat["drive.sample_time"])),
         float(np.max(task.pieces[:, -1, 0])),
     )
     interval = max(1, round(usual_interval(task.duration) / step)) * step
-    several = [*run_flat(flat, floor, task, [0] * count, interval)]
+    several = [*run_flat(flat, floor, task, seeds.tolist(), interval)]
     position, reference, force, reading = (
         np.concatenate([getattr(one, kind)[name] for one in several])
         for kind, name in (("true", "position"), ("logged", "reference"), ("logged", "force"), ("logged", "position"))
@@ -228,10 +270,13 @@ def _of(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, size: floa
     resolution, noise = (np.asarray(flat[f"drive.encoder_{name}"]) for name in ("resolution", "noise"))
     least = np.maximum(resolution, np.abs(reading - reference)[:, -1])
     slips = _time_to_slip(time[quarter], force[:, quarter], position[:, quarter], breakaway, least)
-    lasting = (swing > size) & (swing >= LASTING_SHARE * earlier) & (time[-1] - turned <= period)
+    share = np.where(swing > SMALL_SWING * size, LASTING_SHARE, SMALL_LASTING_SHARE)
+    lasting = (swing > size) & (swing >= share * earlier) & (time[-1] - turned <= period)
     sure, still = lasting & (JUDGED_PERIODS * period <= followed / 2), (earlier <= size) & (slips > 0)
-    flipping, flipped = _periods(time[half], np.where(noise > 0, 0.0, 1.0) * reading[:, half])
-    toggles = still & (resolution > 0) & (time[-1] - flipped <= 2 * flipping)
+    sure, still = (fate & (followed >= FEWEST_SAMPLES * step) for fate in (sure, still))
+    flipping, flipped = _periods(time[half], reading[:, half])
+    counts = (resolution > 0) & (noise == 0) & (earlier <= COUNT * resolution)
+    toggles = still & counts & (time[-1] - flipped <= 2 * flipping)
     fates = {"runs away": away, "failed": ~done, "hunts": sure, "toggles": toggles, "rests": still}
     fate = np.select([*fates.values()], [*fates], "open").astype(object)
     return _Runs(
@@ -288,10 +333,10 @@ def _verdict(moves: np.ndarray, kicks: np.ndarray) -> Verdict | Literal["toggles
     own = moves[0]
     if own in ("hunts", "failed", "runs away"):
         return "hunts" if own == "hunts" else "failed"
-    if own == "open":
-        return "undecided"
-    if "hunts" in moves or "hunts" in kicks:
+    if own != "open" and ("hunts" in moves or "hunts" in kicks):
         return "bistable"
+    if own == "open" or np.count_nonzero(moves == "open") >= len(moves) / 2:
+        return "undecided"
     return "toggles" if "toggles" in moves else "settles"
 
 
@@ -368,13 +413,14 @@ def _reasons(
     task: MoveTask,
     size: float,
     breakaway: float,
+    seed: int,
     quiet: float,
     attracted: bool,
 ) -> tuple[str, ...]:
     """Return what alone makes a run differ from the continuous machine's, which is `attracted` to hunting or not.
 
-    The run has a `task` of its own, as long as it had to be followed, and does not hunt if it swings by at most `quiet`
-    [m], peak to peak.
+    The run has a `task` of its own, as long as it had to be followed, and a `seed`. It does not hunt if it swings by at
+    most `quiet` [m], peak to peak.
     """
     for parts in _without(flat):
         changed = {key: np.full(len(parts), flat[key]) for keys in parts.values() for key in keys if key in flat}
@@ -385,7 +431,7 @@ def _reasons(
         machines = with_complete_drive({**flat, **changed, **timing})
         copies = task.of_runs(np.zeros(len(parts), int))
         try:
-            runs = _of(machines, floor, copies, size, breakaway)
+            runs = _of(machines, floor, copies, size, breakaway, np.full(len(parts), seed))
         except InputError:  # a delay of more samples than a machine may have
             continue
         alike = runs.fate == "hunts" if attracted else runs.swing <= quiet

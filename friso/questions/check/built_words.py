@@ -6,14 +6,23 @@ from dataclasses import asdict
 from typing import Any
 
 from friso.hunting.criteria import ATTRACTED
-from friso.shown.text import listed, range_with_unit, unstable_where, with_unit
+from friso.shown.text import after_loop, listed, range_with_unit, unstable_where, with_unit
 from friso.virtual_rig.verdict import Built
 
 
-def built_sentences(built: Built) -> list[str]:
-    """Say what the machine as built does, how sure that is, and why it differs if it does; then what its loop does."""
+def built_sentences(built: Built, where: str = "") -> list[str]:
+    """Say what the machine as built does, how sure that is, and why it differs if it does; then what its loop does.
+
+    `where` says of which of several machines that is told.
+    """
     looped = f"With its samples and delays the loop is {unstable_where(built.unstable)}."
-    return [f"As built: {does_as_built(built)}{_unlike(built)}.", *[looped] * bool(built.unstable)]
+    return [f"As built{where}: {does_as_built(built)}{_unlike(built)}.", *[looped] * bool(built.unstable)]
+
+
+def built_in_short(built: Built) -> str:
+    """Write in the fewest words whether the loop is unstable as built, what the machine does, and how sure that is."""
+    does = f"as built: {built.verdict}{'' if built.certain else ' (not certain)'}"
+    return "; ".join(filter(None, [after_loop("", (), built.unstable), does]))
 
 
 def does_as_built(built: Built) -> str:
@@ -38,13 +47,17 @@ def _does(built: Built) -> str:
         return f"settles{lost if built.runs_away_after else ''}"
     if built.verdict == "failed":
         return "runs away from its reference" if built.moves.get("runs away") else "could not be run to its end"
+    if not built.followed:
+        return "was not run, as its motion takes too many samples"
+    if built.moves.get("open", 0) < sum(built.moves.values()):
+        return "was seen at rest, but not at enough places in a count"
     return f"still moves {with_unit(built.followed, 's')} after its motion"
 
 
 def _swings(built: Built) -> str:
     """Write the ranges of amplitude and period of the runs that swing."""
     assert built.amplitude
-    size = f"±{range_with_unit(*built.amplitude, 'm')}"
+    size = f"±{range_with_unit(*built.amplitude, 'm')}".replace("±< ", "less than ±")
     return f"{size} every {range_with_unit(*built.period, 's')}" if built.period else size
 
 
@@ -52,6 +65,9 @@ def _doubt(built: Built) -> str:
     """Say why the verdict is not certain."""
     if built.slips_after is not None:
         return f"its integral still winds, and may break it away after {with_unit(built.slips_after, 's', 2)}"
+    still = built.moves.get("rests", 0) + built.moves.get("toggles", 0)
+    if built.verdict == "hunts" and still:
+        return f"at {still} of {sum(built.moves.values())} places in a count it does not"
     runs = {fate: built.moves.get(fate, 0) + built.kicks.get(fate, 0) for fate in ("open", "failed")}
     if runs["open"] or runs["failed"]:
         count = sum(built.moves.values()) + sum(built.kicks.values())

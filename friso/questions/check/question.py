@@ -356,7 +356,7 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     says, colours = [*_verdicts(check), *motion_sentences(stage), *notes], [item.colour for item in cases]
     if built := check.as_built:
         yield AnswerBlock(
-            sentences=built_sentences(built),
+            sentences=built_sentences(built, ", at the centre of its ranges" if draws else ""),
             colours=[COLOURS["given"]],
             numbers=lambda: _built_document(built, check.result["given"]),
         )
