@@ -25,13 +25,34 @@ It swings by more than a count, swings by at most one, rests, or diverges. It is
 
 @dataclass(frozen=True)
 class FollowedRuns:
-    """Runs that were followed: fate, swing [m], period [s], time to the next slip [s], time followed [s], (n,)."""
+    """Runs that were followed, (n,) each.
+
+    They have a `fate`; a swing [m] and a period [s]; the largest deviation in the end, `error` [m]; and times [s] after
+    the last corner of the reference: until the deviation stays in a band, to the next slip, and followed in all.
+    """
 
     fate: np.ndarray
     swing: np.ndarray
     period: np.ndarray
+    error: np.ndarray
+    settled: np.ndarray
     slips_after: np.ndarray
     followed: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What tells runs apart, on a `floor` that may shake.
+
+    - `size` [m]: largest swing of a stage at rest, peak to peak; see `size_of_rest`.
+    - `breakaway` [N]: least force that moves the stage, inf if its motor exerts less.
+    - `band` [m]: deviation within which a stage is in position.
+    """
+
+    floor: Floor | None
+    size: float
+    breakaway: float
+    band: float
 
 
 SAMPLES = 1e7
@@ -58,16 +79,11 @@ NOISE_WIDTH = 10.0  # [RMS]
 """Width of noise, peak to peak. Of a million samples none lies beyond."""
 
 
-def follow(
-    flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, size: float, breakaway: float, samples: float
-) -> FollowedRuns:
-    """Run a task until each run rests or surely does not, over at most so many samples of the drive in all.
-
-    `size` [m] is the largest swing of a stage at rest, and `breakaway` [N] the least force that moves it.
-    """
+def follow(flat: Mapping[str, Any], task: MoveTask, bounds: Bounds, samples: float = SAMPLES) -> FollowedRuns:
+    """Run a task until each run rests or surely does not, over at most so many samples of the drive in all."""
     count, step = len(task.pieces), float(np.min(flat["drive.sample_time"]))
     corner = float(np.max(task.pieces[:, -1, 0]))
-    runs = FollowedRuns(np.full(count, "open", object), *(np.full(count, np.nan) for _ in range(4)))
+    runs = FollowedRuns(np.full(count, "open", object), *(np.full(count, np.nan) for _ in range(6)))
     left, after = np.arange(count), max(task.duration - corner, FEWEST_SAMPLES * step, corner / LONGEST_MOTION)
     if count * (corner + after) > samples * step:
         least = min(after / LONGER**2, samples * step / TOGETHER - corner)
@@ -75,9 +91,7 @@ def follow(
     while left.size and after > 0 and (affordable := int(samples * step / (corner + after)) // TOGETHER * TOGETHER):
         left = left[:affordable]
         part = {key: value[left] if np.ndim(value) else value for key, value in flat.items()}
-        some = runs_to_their_end(
-            part, floor, replace(task.of_runs(left), duration=corner + after), size, breakaway, left
-        )
+        some = runs_to_their_end(part, replace(task.of_runs(left), duration=corner + after), bounds, left)
         for name, column in vars(runs).items():
             column[left] = getattr(some, name)
         samples -= -(-left.size // TOGETHER) * TOGETHER * (corner + after) / step
@@ -121,22 +135,11 @@ SMALL_SWING = 3.0  # [largest swing of a stage at rest]
 """Largest swing that is small."""
 
 
-def runs_to_their_end(
-    flat: Mapping[str, Any],
-    floor: Floor | None,
-    task: MoveTask,
-    size: float,
-    breakaway: float,
-    seeds: np.ndarray,
-) -> FollowedRuns:
+def runs_to_their_end(flat: Mapping[str, Any], task: MoveTask, bounds: Bounds, seeds: np.ndarray) -> FollowedRuns:
     """Run a task once, with these seeds of its noise, (runs,), and say what each run does in the end."""
-    count, step, corner = (
-        len(task.pieces),
-        float(np.min(flat["drive.sample_time"])),
-        float(np.max(task.pieces[:, -1, 0])),
-    )
+    step, corner, size = float(np.min(flat["drive.sample_time"])), float(np.max(task.pieces[:, -1, 0])), bounds.size
     interval = max(1, round(usual_interval(task.duration) / step)) * step
-    several = [*run_flat(flat, floor, task, seeds.tolist(), interval)]
+    several = [*run_flat(flat, bounds.floor, task, seeds.tolist(), interval)]
     position, reference, force, reading = (
         np.concatenate([getattr(one, kind)[name] for one in several])
         for kind, name in (("true", "position"), ("logged", "reference"), ("logged", "force"), ("logged", "position"))
@@ -149,7 +152,7 @@ def runs_to_their_end(
     period, turned = _periods(time[half], deviation[:, half])
     resolution, noise = (np.asarray(flat[f"drive.encoder_{name}"]) for name in ("resolution", "noise"))
     least = np.maximum(resolution, np.abs(reading - reference)[:, -1])
-    slips = _time_to_slip(time[quarter], force[:, quarter], position[:, quarter], breakaway, least)
+    slips = _time_to_slip(time[quarter], force[:, quarter], position[:, quarter], bounds.breakaway, least)
     share = np.where(swing > SMALL_SWING * size, LASTING_SHARE, SMALL_LASTING_SHARE)
     lasting = (swing > size) & (swing >= share * earlier) & (time[-1] - turned <= period)
     sure, still = lasting & (JUDGED_PERIODS * period <= followed / 2), (earlier <= size) & (slips > 0)
@@ -159,12 +162,16 @@ def runs_to_their_end(
     toggles = still & counts & (time[-1] - flipped <= 2 * flipping)
     fates = {"runs away": away, "failed": ~done, "hunts": sure, "toggles": toggles, "rests": still}
     fate = np.select([*fates.values()], [*fates], "open").astype(object)
+    outside = np.abs(deviation) > bounds.band
+    settled = time[len(time) - 1 - np.argmax(outside[:, ::-1], axis=1)] - corner
     return FollowedRuns(
         fate,
         swing,
         np.where(toggles, flipping, period),
+        np.abs(deviation[:, half]).max(axis=1),
+        np.where(outside[:, -1], np.inf, np.where(outside.any(axis=1), np.maximum(settled, 0.0), 0.0)),
         np.where(fate == "rests", slips, np.inf),
-        np.full(count, followed),
+        np.full(len(fate), followed),
     )
 
 

@@ -14,12 +14,13 @@ import numpy as np
 
 from friso.equations import motion
 from friso.errors import InputError
-from friso.hunting import Case, LoopState
+from friso.hunting import Case, LoopState, least_breakaway_force
 from friso.hunting.criteria import ATTRACTED, Verdict
+from friso.hunting.measures import bands_of
 from friso.shown.text import lost_as_built
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.rig import Floor, is_as_built
-from friso.virtual_rig.followed import SAMPLES, Fate, follow, runs_to_their_end, size_of_rest
+from friso.virtual_rig.followed import Bounds, Fate, FollowedRuns, follow, runs_to_their_end, size_of_rest
 from friso.virtual_rig.run import as_built_keys, with_complete_drive
 from friso.virtual_rig.task import MoveTask, motion_task
 
@@ -35,6 +36,8 @@ class Built:
     - `moves`, `kicks`: how many of the runs have each `Fate`.
     - `smallest_kick`, `runs_away_after` [m]: smallest displacement tried that starts hunting, or after which the stage
       runs away (None: none).
+    - `rest_error` [m], `settled_after` [s]: the largest of moves that rest or toggle: error in the end, and time after
+      the motion until it stays within the stage's tolerance (inf: it does not). None if none rests.
     - `followed` [s]: the longest time after the last corner of the reference.
     - `slips_after` [s]: time at which a winding integral would break a resting stage away (None: it does not wind).
     - `because`: what alone makes the verdict differ from the continuous machine's, in words.
@@ -50,6 +53,8 @@ class Built:
     kicks: Mapping[Fate, int]
     smallest_kick: float | None
     runs_away_after: float | None
+    rest_error: float | None
+    settled_after: float | None
     followed: float
     slips_after: float | None
     differs: bool = False
@@ -76,39 +81,48 @@ def judge_as_built(case: Case) -> Built | None:
     if not is_as_built(stage) or case.verdict == "none":
         return None
     flat = as_built_keys(stage)
-    size = size_of_rest(flat)
-    task, kicks = _task(flat, size, case)
-    breakaway = case.breakaway if _largest_force(flat) >= case.breakaway else np.inf
-    runs = follow(flat, stage.floor, task, size, breakaway, SAMPLES)
+    swing = case.judgement.swing.amplitude if case.judgement.swing else 0.0
+    task, kicks, bounds = tried(flat, stage.floor, swing)
+    runs = follow(flat, task, bounds)
+    built = replace(seen(runs, kicks, stage.doubt), unstable=lost_as_built(stage))
+    attracted = case.verdict in ATTRACTED
+    if built.verdict in ("undecided", "failed") or (built.verdict in ATTRACTED) == attracted:
+        return built
+    unlike = np.flatnonzero((runs.fate == "hunts") != attracted)
+    if case.verdict == "bistable" and swing:
+        far = np.abs(np.log(np.abs(kicks) / swing))
+        unlike = PLACES + np.argsort(far)
+    one = replace(task.of_runs(unlike[:1]), duration=float(task.pieces[0, -1, 0] + runs.followed[unlike[0]]))
+    hunting = swing if attracted and swing else float(runs.swing[unlike[0]]) / 2
+    because = _reasons(flat, one, bounds, int(unlike[0]), QUIET_SHARE * hunting, attracted)
+    return replace(built, differs=True, because=because)
+
+
+def seen(runs: FollowedRuns, kicks: np.ndarray, doubt: str = "") -> Built:
+    """Return the verdict that follows from runs: of moves, the own one first, and of kicks [m], (KICKS,).
+
+    It is not certain of a stage in `doubt`.
+    """
     moves, kicked = runs.fate[:PLACES], runs.fate[PLACES:]
     swings = runs.fate == ("hunts" if "hunts" in runs.fate else "toggles")
     winding = runs.slips_after[(runs.fate == "rests") & np.isfinite(runs.slips_after)]
     followed = not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
     sure = (moves == "hunts").all() or (followed and moves[0] != "hunts")
-    built = Built(
+    rests = np.isin(moves, ("rests", "toggles"))
+    return Built(
         verdict=_verdict(moves, kicked),
-        certain=not stage.doubt and bool(sure),
+        certain=not doubt and bool(sure),
         amplitude=_ends(runs.swing[swings] / 2),
         period=_ends(runs.period[swings]),
         moves=_counted(moves),
         kicks=_counted(kicked),
         smallest_kick=_smallest(kicks[kicked == "hunts"]),
         runs_away_after=_smallest(kicks[kicked == "runs away"]),
+        rest_error=_largest(runs.error[:PLACES][rests]),
+        settled_after=_largest(runs.settled[:PLACES][rests]),
         followed=float(np.nanmax(runs.followed, initial=0.0)),
         slips_after=_smallest(winding),
-        unstable=lost_as_built(stage),
     )
-    attracted = case.verdict in ATTRACTED
-    if built.verdict in ("undecided", "failed") or (built.verdict in ATTRACTED) == attracted:
-        return built
-    unlike = np.flatnonzero((runs.fate == "hunts") != attracted)
-    if case.verdict == "bistable" and case.judgement.swing:
-        far = np.abs(np.log(np.abs(kicks) / case.judgement.swing.amplitude))
-        unlike = PLACES + np.argsort(far)
-    one = replace(task.of_runs(unlike[:1]), duration=float(task.pieces[0, -1, 0] + runs.followed[unlike[0]]))
-    swing = case.judgement.swing.amplitude if attracted and case.judgement.swing else float(runs.swing[unlike[0]]) / 2
-    because = _reasons(flat, stage.floor, one, size, breakaway, int(unlike[0]), QUIET_SHARE * swing, attracted)
-    return replace(built, differs=True, because=because)
 
 
 def _largest_force(flat: Mapping[str, Any]) -> float:
@@ -117,12 +131,14 @@ def _largest_force(flat: Mapping[str, Any]) -> float:
     return float(flat.get(FORCE_LIMIT, np.inf) * motor)
 
 
-def _task(flat: Mapping[str, Any], size: float, case: Case) -> tuple[MoveTask, np.ndarray]:
-    """Return the moves and kicks that are run, and the kicks' sizes [m], (KICKS,).
+def tried(flat: Mapping[str, Any], floor: Floor | None, swing: float = 0.0) -> tuple[MoveTask, np.ndarray, Bounds]:
+    """Return the moves and kicks that are run, the kicks' sizes [m], (KICKS,), and what tells the runs apart.
 
-    A move that leads to another place in a count also begins there: it is the whole motion that lies elsewhere on the
-    encoder.
+    `flat` has the complete keys of a machine on a `floor`, which may hunt with an amplitude of `swing` [m]. A move that
+    leads to another place in a count also begins there: it is the whole motion that lies elsewhere on the encoder.
     """
+    size, least = size_of_rest(flat), least_breakaway_force(dict(flat))
+    bounds = Bounds(floor, size, least if _largest_force(flat) >= least else np.inf, bands_of(flat)[0])
     task = motion_task(flat, 1)
     one = task.pieces.reshape(-1, *task.pieces.shape[-2:])[0]
     pieces = np.repeat(one[None], PLACES + KICKS, axis=0)
@@ -131,11 +147,10 @@ def _task(flat: Mapping[str, Any], size: float, case: Case) -> tuple[MoveTask, n
     places = np.arange(PLACES) / PLACES * flat["drive.encoder_resolution"]
     pieces[:PLACES, :, 1] += places[:, None]
     pieces[PLACES:, :, 1:] = one[-1, 1:]
-    swing = case.judgement.swing
-    largest = max(KICK_RANGE[1] * size, float(np.max(motion.size(flat))), 2 * swing.amplitude if swing else 0.0)
+    largest = max(KICK_RANGE[1] * size, float(np.max(motion.size(flat))), 2 * swing)
     kicks = np.geomspace(KICK_RANGE[0] * size, largest, KICKS) * np.where(np.arange(KICKS) % 2, -1.0, 1.0)
     displacements = np.concatenate([sides * float(np.max(task.displacement)), kicks])
-    return replace(task, pieces=pieces, displacement=displacements), kicks
+    return replace(task, pieces=pieces, displacement=displacements), kicks, bounds
 
 
 def _verdict(moves: np.ndarray, kicks: np.ndarray) -> Verdict | Literal["toggles"]:
@@ -157,6 +172,11 @@ def _counted(fates: np.ndarray) -> dict[Fate, int]:
 def _smallest(values: np.ndarray) -> float | None:
     """Return the smallest of some values, whatever their signs; None if there are none."""
     return float(np.abs(values).min()) if values.size else None
+
+
+def _largest(values: np.ndarray) -> float | None:
+    """Return the largest of some values; None if there are none."""
+    return float(values.max()) if values.size else None
 
 
 def _ends(values: np.ndarray) -> tuple[float, float] | None:
@@ -218,14 +238,7 @@ QUIET_SHARE = 0.2
 
 
 def _reasons(
-    flat: Mapping[str, Any],
-    floor: Floor | None,
-    task: MoveTask,
-    size: float,
-    breakaway: float,
-    seed: int,
-    quiet: float,
-    attracted: bool,
+    flat: Mapping[str, Any], task: MoveTask, bounds: Bounds, seed: int, quiet: float, attracted: bool
 ) -> tuple[str, ...]:
     """Return what alone makes a run differ from the continuous machine's, which is `attracted` to hunting or not.
 
@@ -241,7 +254,7 @@ def _reasons(
         machines = with_complete_drive({**flat, **changed, **timing})
         copies = task.of_runs(np.zeros(len(parts), int))
         try:
-            runs = runs_to_their_end(machines, floor, copies, size, breakaway, np.full(len(parts), seed))
+            runs = runs_to_their_end(machines, copies, bounds, np.full(len(parts), seed))
         except InputError:  # a delay of more samples than a machine may have
             continue
         alike = runs.fate == "hunts" if attracted else runs.swing <= quiet

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from friso.equations.bandwidth import bandwidth, static_frictions
+from friso.hunting import ParameterMargin
 from friso.hunting.criteria import ATTRACTED
+from friso.questions.check.margin_words import margin_sentence
 from friso.shown.text import after_loop, listed, range_with_unit, unstable_where, with_unit
+from friso.stage import Stage
 from friso.virtual_rig.verdict import Built
 
 
@@ -85,9 +90,22 @@ def _unlike(built: Built) -> str:
     return f"; without {listed(built.because, 'or')} it {would}"
 
 
+def built_margin_sentences(stage: Stage, margins: Mapping[str, ParameterMargin]) -> list[str]:
+    """Say over which bandwidths, and which static friction, the machine as built does the same."""
+    flat, sentences = stage.flat(), []
+    for name, margin in margins.items():
+        pairs = [*static_frictions(flat)]
+        static = flat[pairs[0]] if len(pairs) == 1 else None
+        own, unit = (bandwidth(flat), "Hz") if name == "bandwidth" else (static, "N")
+        said = margin_sentence(name, margin, own, unit, thin=True)
+        sentences.append(f"As built: {said[:1].lower()}{said[1:]}")
+    return sentences
+
+
 def built_document(built: Built) -> dict[str, Any]:
     """Return the verdict on the machine as built, and the runs behind it."""
     names = {"amplitude": "amplitude_m", "period": "period_s", "smallest_kick": "smallest_kick_m"}
     names |= {"runs_away_after": "runs_away_after_m", "followed": "followed_s", "slips_after": "slips_after_s"}
+    names |= {"rest_error": "rest_error_m", "settled_after": "settled_after_s"}
     names |= {"unstable": "loop_unstable_while_it"}
     return {names.get(name, name): value for name, value in asdict(built).items()}
