@@ -44,6 +44,12 @@ FIELD = f"{ROW} input[type=text]"
 SLIDER = f"{ROW} input[type=range]"
 CHANGES = "async () => (await import('/state.js')).changes()"
 CHANGE = "async changes => (await import('/state.js')).set(changes)"
+DRAWN = {
+    "ball_screw_axis": ["screw, 10 mm", "velocity", "position", "20 kg", "Bearing: lugre"],
+    "robot_wrist": ["encoder", "0.004 kg*m^2", "rigid", "0.002 kg*m^2", "Bearing: lugre"],
+}
+"""What stands in the drawing of a machine in small letters."""
+
 CHANNELS = ("time [s]", "position [m]", "force [N]")
 PICTURE = "#picture .js-plotly-plot .main-svg"
 
@@ -304,6 +310,11 @@ def test_open(browsed: Browsed, tmp_path: Path) -> None:
     page.click("text=Edit the file")
     page.fill("#dialog textarea", TEXT.replace("8 Hz", "7 Hz"))
     page.click("text=Use this text")
+    browsed.field("7 Hz")
+    for name, words in DRAWN.items():
+        browsed.add(f"{name}.toml", Path(friso.example(name)).read_text(encoding="utf-8"))
+        wait_until(lambda words=words: page.locator("#drawing .small").all_text_contents() == words)
+        page.click("#close")
     browsed.field("7 Hz")
     page.click("#out")
     assert browsed.download(tmp_path / "out.toml") == "wrong_2.toml"  # it stands for no file that was opened
