@@ -82,11 +82,11 @@ def test_runs_are_followed_however_long_their_motion(changes: dict[str, object],
     assert judged.certain == (len(moves) == 1)
 
 
-def test_a_stage_that_hunts_at_some_places_alone_is_not_certain() -> None:
+def test_a_stage_that_hunts_at_some_places_alone_is_bistable() -> None:
     """Whether it hunts then depends on where its target lies between two counts."""
     judged = built({"drive.encoder_resolution": "0.75 mrad"})
     assert {"hunts", "rests"} <= {*judged.moves}
-    assert not judged.certain
+    assert judged.verdict == "bistable"
 
 
 def test_a_finer_encoder_with_a_dead_band_of_its_count_cures_it_where_the_dead_band_alone_does_not() -> None:
@@ -96,7 +96,7 @@ def test_a_finer_encoder_with_a_dead_band_of_its_count_cures_it_where_the_dead_b
     assert (cure.kind, drive["drive.encoder_resolution"]) == ("a finer encoder", drive["drive.integrator_deadband"])
     assert cure.built.rest_error
     assert cure.built.rest_error <= drive["drive.encoder_resolution"]
-    assert judged(COUNTS.replace({"drive.encoder_resolution": "0.75 mrad"})).verdict == "hunts"
+    assert judged(COUNTS.replace({"drive.encoder_resolution": "0.75 mrad"})).verdict == "bistable"
 
 
 @pytest.mark.slow

@@ -29,9 +29,9 @@ from friso.virtual_rig.task import MoveTask, motion_task
 class Built:
     """The verdict on a stage as built, and the runs behind it.
 
-    - `verdict`: "hunts", "bistable", "toggles" (it swings by at most a count), "settles", "undecided" or "failed" (its
-      run did, or it runs away).
-    - `certain`: every run was followed until it rested, or surely did not, and none rests of a stage that "hunts".
+    - `verdict`: "hunts" (at every place in a count), "bistable" (at some, or after a kick), "toggles" (it swings by at
+      most a count), "settles", "undecided" or "failed" (its own run did, or it runs away).
+    - `certain`: every run was followed until it rested or surely did not, or all moves hunt.
     - `amplitude` [m], `period` [s]: least and largest of the runs that swing, (2,) each; None if none does.
     - `moves`, `kicks`: how many of the runs have each `Fate`.
     - `smallest_kick`, `runs_away_after` [m]: smallest displacement tried that starts hunting, or after which the stage
@@ -107,11 +107,10 @@ def seen(runs: FollowedRuns, kicks: np.ndarray, doubt: str = "") -> Built:
     swings = runs.fate == ("hunts" if "hunts" in runs.fate else "toggles")
     winding = runs.slips_after[(runs.fate == "rests") & np.isfinite(runs.slips_after)]
     followed = not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
-    sure = (moves == "hunts").all() or (followed and moves[0] != "hunts")
     rests = np.isin(moves, ("rests", "toggles"))
     return Built(
         verdict=_verdict(moves, kicked),
-        certain=not doubt and bool(sure),
+        certain=not doubt and (followed or bool((moves == "hunts").all())),
         amplitude=_ends(runs.swing[swings] / 2),
         period=_ends(runs.period[swings]),
         moves=_counted(moves),
@@ -155,12 +154,14 @@ def tried(flat: Mapping[str, Any], floor: Floor | None, swing: float = 0.0) -> t
 
 def _verdict(moves: np.ndarray, kicks: np.ndarray) -> Verdict | Literal["toggles"]:
     """Return the verdict that follows from the fates of moves, the own one first, and of kicks."""
-    own = moves[0]
-    if own in ("hunts", "failed", "runs away"):
-        return "hunts" if own == "hunts" else "failed"
-    if own != "open" and ("hunts" in moves or "hunts" in kicks):
+    hunts, still = moves == "hunts", np.isin(moves, ("rests", "toggles"))
+    if moves[0] in ("failed", "runs away"):
+        return "failed"
+    if hunts.any() and not still.any():
+        return "hunts"
+    if hunts.any() or (moves[0] != "open" and "hunts" in kicks):
         return "bistable"
-    if own == "open" or np.count_nonzero(moves == "open") >= len(moves) / 2:
+    if moves[0] == "open" or np.count_nonzero(moves == "open") >= len(moves) / 2:
         return "undecided"
     return "toggles" if "toggles" in moves else "settles"
 

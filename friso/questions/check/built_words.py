@@ -40,10 +40,11 @@ def _does(built: Built) -> str:
     if built.verdict == "hunts":
         return f"hunts, {_swings(built)}"
     if built.verdict == "bistable":
-        places = built.moves.get("hunts", 0)
-        share = f"at {places} of {sum(built.moves.values())} places in a count" if places else ""
-        kick = f"after a displacement of {with_unit(built.smallest_kick, 'm')}" if built.smallest_kick else ""
-        return f"settles after this move, but hunts {listed([*filter(None, [share, kick])], 'and')}, {_swings(built)}"
+        if places := built.moves.get("hunts", 0):
+            count = sum(built.moves.values())
+            return f"hunts at {places} of {count} places of its target in a count, {_swings(built)}"
+        kick = with_unit(built.smallest_kick or 0.0, "m")
+        return f"settles after its motion, but hunts after a displacement of {kick}, {_swings(built)}"
     if built.verdict == "toggles":
         often = f" every {range_with_unit(*built.period, 's')}" if built.period else ""
         return f"settles, but toggles by no more than a count of its encoder{often}"
@@ -70,9 +71,6 @@ def _doubt(built: Built) -> str:
     """Say why the verdict is not certain."""
     if built.slips_after is not None:
         return f"its integral still winds, and may break it away after {with_unit(built.slips_after, 's', 2)}"
-    still = built.moves.get("rests", 0) + built.moves.get("toggles", 0)
-    if built.verdict == "hunts" and still:
-        return f"at {still} of {sum(built.moves.values())} places in a count it does not"
     runs = {fate: built.moves.get(fate, 0) + built.kicks.get(fate, 0) for fate in ("open", "failed")}
     if runs["open"] or runs["failed"]:
         count = sum(built.moves.values()) + sum(built.kicks.values())
