@@ -389,7 +389,7 @@ def check_of(verdict: str, **more: Any) -> Any:
 
 def as_built(verdict: Any, certain: bool) -> Built:
     one = (1.0, 1.0)
-    return Built(verdict, certain, one, one, {"hunts": 1}, {}, None, None, 1.0, None)
+    return Built(verdict, certain, one, one, {"hunts": 1}, {}, None, None, None, None, 1.0, None)
 
 
 WARNS = {"settles": False, "transient": False} | dict.fromkeys(
