@@ -352,6 +352,16 @@ def test_edit(unchecked: Browsed) -> None:
     browsed.type("9")
     browsed.field("9 Hz")
     assert browsed.changes() == {"controller.crossover": "9 Hz"}
+    page.select_option("#key-controller-kind", "transfer_function")
+    page.wait_for_selector("#keys >> text=In the text")
+    page.select_option("#key-controller-kind", "cascade")
+    page.wait_for_function("() => document.querySelector('#key-controller-kv')?.value === '17.88 1/s'")
+    page.select_option("#key-controller-kind", "pid by crossover")
+    browsed.field("9 Hz")
+    for _ in range(3):
+        page.click("#undo")
+    assert browsed.changes() == {"controller.crossover": "9 Hz"}
+    browsed.field("9 Hz")
     browsed.type_meanwhile("11 Hz", "10.5 H")
     page.keyboard.type("z")
     page.keyboard.press("Enter")

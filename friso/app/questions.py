@@ -134,6 +134,12 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
 
 
+def controller(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """Yield the keys that change if the machine has another kind of controller."""
+    name = str(asked.chosen("name").get("name"))
+    yield {"kind": "answer", "changes": machines.as_controller(asked.machine.stage, name)}
+
+
 def others_of_stages() -> list[str]:
     """Return the questions of installed packages that need only a stage.
 
@@ -542,6 +548,7 @@ def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
 
 QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "machine": machine,
+    "controller": controller,
     "run": run,
     "cell": cell,
     "verdict": verdict,
@@ -559,7 +566,7 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 }
 """The functions that answer questions, by name."""
 
-QUICK = frozenset({"machine"})
+QUICK = frozenset({"machine", "controller"})
 """The questions that need no computation."""
 
 FIRST = frozenset({"verdict", "run", "cell", "loops", "bode", "flexure", "map"})

@@ -89,6 +89,9 @@ function row(key, machine, changed, tell) {
     const options = key.options.map((word) => el("option", { value: word, selected: word === value }, word));
     if (value === undefined || value === null) options.unshift(el("option", { value: "", selected: true }, "–"));
     item.append(el("select", { id, onchange: (event) => event.target.value && tell.set(key.path, event.target.value) }, ...options));
+  } else if (key.kind === "controller") {
+    const options = key.options.map((name) => el("option", { value: name, selected: name === key.own }, name));
+    item.append(el("select", { id, onchange: (event) => tell.controller(event.target.value) }, ...options));
   } else if (key.kind === "array") {
     item.append(el("button", { id, type: "button", onclick: () => tell.edit() }, "In the text"));
   } else {

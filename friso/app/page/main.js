@@ -178,12 +178,21 @@ function left() {
   drawn = { machine, part: chosen };
   keys($("keys"), shown, chosen, machines.changes(), wrong, {
     set: (path, value, dragged = false) => machine === machines.current() && set({ [path]: value }, dragged),
+    controller: changeController,
     hold: machines.hold,
     release: machines.release,
     edit: editText,
   });
   mark($("keys"), now(), FIELDS);
   if (tracked.version && isNow(tracked.version)) colourTracks(tracked.tracks);
+}
+
+/** Set the keys with which the machine has another kind of controller. */
+async function changeController(name) {
+  const version = now();
+  const part = await ask("controller", { machine: version.sent, options: { name } }, "controller");
+  if (part?.kind === "answer" && isNow(version)) set(part.changes);
+  else left(); // the kind is as it was
 }
 
 /** The text of the machine as it is set now, which the server may not have written yet. */
