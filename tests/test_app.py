@@ -386,8 +386,8 @@ LOG = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k
 
 
 def test_what_is_wrong_or_names_a_file_is_refused(served: Served) -> None:
-    (part,) = served.ask("machine", RIG, {"masses.cart": "3 N"})
-    assert (part["kind"], part["key"]) == ("refused", "masses.cart")
+    opened, part = served.ask("machine", RIG, {"masses.cart": "3 N"})
+    assert (part["kind"], part["key"], opened["toml"]) == ("refused", "masses.cart", friso.load(RIG).to_toml())
     for question in ("check", "map", "boundary", "tune", "design", "run"):
         for options in ({"out": "/tmp/x"}, {"spec": "/etc/passwd"}, {"export": ["/tmp/x.csv"]}):
             assert served.ask(question, RIG, {}, **options)[-1]["kind"] == "refused"

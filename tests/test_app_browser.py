@@ -418,6 +418,11 @@ def test_edit(unchecked: Browsed) -> None:
     page.wait_for_selector(f"{ROW} .wrong", state="detached")
     page.click("#undo")  # one pull is one step
     page.wait_for_selector(f"{ROW} .wrong")
+    page.click("[data-part=stage]")
+    page.reload()
+    page.wait_for_selector(f"{ROW} .wrong")
+    assert page.input_value(FIELD) == "3 kg"
+    assert page.is_disabled("#out")
     page.click("#undo")
     page.wait_for_selector(f"{ROW} .wrong", state="detached")
     browsed.field("11 Hz")
@@ -742,7 +747,7 @@ def test_hostile(browsed: Browsed, chromium: Any, tmp_path: Path) -> None:
     shown = page.inner_text("body")
     assert escaped(shown) == shown
 
-    page.evaluate(LINK, {"masses.cart": [1]})
+    page.evaluate(LINK, {"masses.cart": [[1]]})
     page.wait_for_selector("#trouble:not([hidden])")
     page.evaluate(LINK, None)
     page.wait_for_selector("#machines >> text=linked")

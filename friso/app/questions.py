@@ -126,12 +126,19 @@ def words_of(answer: Answer) -> AnswerPart:
 
 
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the machine's keys, the metrics of maps, and questions of installed packages."""
+    """Yield the machine's keys, the metrics of maps, and questions of installed packages.
+
+    If a changed key is wrong, the keys of the file as it was opened come before the error.
+    """
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
     in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # metrics in words first
     shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in in_order]}
-    yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
+    try:
+        yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
+    except InputError:
+        yield {"kind": "partly", **shown, **machines.machine_on_page(replace(asked.machine, changed="{}"))}
+        raise
 
 
 def controller(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:

@@ -72,7 +72,9 @@ function drawn(place, machine, part, changed, wrong, tell) {
 export function refuse(place, wrong) {
   place.querySelectorAll(".wrong").forEach((item) => item.remove());
   for (const item of place.querySelectorAll("[data-path]")) {
-    if (wrong?.keys.includes(item.dataset.path)) item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
+    if (!wrong?.keys.includes(item.dataset.path)) continue;
+    item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
+    item.closest("details")?.toggleAttribute("open", true);
   }
 }
 

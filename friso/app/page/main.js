@@ -1,7 +1,7 @@
 // The page: connects the machine, its keys, the answer and the pictures.
 import * as answers from "./answer.js";
 import { $, anew, el, plain, tabs } from "./dom.js";
-import { drawing } from "./drawing.js";
+import { drawing, PARTS } from "./drawing.js";
 import { alongTracks, colourTracks, edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
@@ -84,19 +84,26 @@ function follow(dragged) {
 function described(part, version) {
   const { machine } = version;
   if (part.kind === "answer") version.described = part;
-  if (part.kind !== "message") version.settle(part);
+  if (part.kind === "partly") version.opened = part;
+  if (part.kind !== "message" && part.kind !== "partly") version.settle(part);
   if (machine !== machines.current()) return; // another one is shown by now, and asked about
   if (part.kind === "refused" || part.kind === "failed") {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
-    if (!shown || held !== machine.text) return without(part, version);
+    if (!shown || held !== machine.text) {
+      without(part, version);
+      if (!version.opened) return;
+      [shown, seen, held] = [version.opened, version, machine.text]; // its wrong key can be set here
+      forgetRanges();
+      chosen = PARTS.find(({ tables }) => tables.includes(wrong.keys[0].split(".")[0]))?.id ?? chosen;
+    }
     usable();
     left();
     if (!$("keys").querySelector(".wrong")) answers.refused(part.text, version);
     return;
   }
   if (part.kind !== "answer") return;
-  const opened = held !== machine.text;
+  const opened = held !== machine.text || !pictures.machine;
   const another = wrong !== null || opened;
   wrong = null;
   shown = part;
