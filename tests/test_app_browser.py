@@ -291,6 +291,7 @@ def test_ask(browsed: Browsed) -> None:
     browsed.says("Locked (as given): hunts")
     page.click("#verdict button:text-is('Free the joint')")
     browsed.verdict("settles")
+    assert page.inner_text("#verdict strong").lower() == "free: settles"
     assert browsed.changes()["joint.locked"] is False
     page.click("#verdict button:text-is('Take back: Free the joint')")
     browsed.says("Locked (as given): hunts")

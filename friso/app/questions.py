@@ -39,7 +39,7 @@ from friso.quantities import exactly
 from friso.questions.logs.question import LogsAnswer, options_of
 from friso.questions.map.cells import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
-from friso.shown.motion_words import COLOURS, case_labels, verdict_in_short
+from friso.shown.motion_words import COLOURS, LABELS, case_labels, verdict_in_short
 from friso.shown.text import after_loop, lost_as_built, unknown_condition
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -238,10 +238,10 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
         words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
-    word, lost = words[_given(stage)], lost_as_built(stage)
-    short = after_loop(f"{word}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
+    lost = lost_as_built(stage)
+    short = after_loop(f"{words[_given(stage)]}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
     certain = {"certain": not stage.doubt and not lost, "in_short": short}
-    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": word, **certain}
+    yield {"kind": "answer", **_told(stage, words), **certain}
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -251,7 +251,7 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     answer = KEPT.answer(friso.check, asked.machine, work, options)
     cases = {name: case.verdict for name, case in answer.result.items()}
     stage = asked.machine.stage
-    more = {"cases": _labelled(stage, cases), "verdict": cases[_given(stage)], **_lines("check", asked, options)}
+    more = {**_told(stage, cases), **_lines("check", asked, options)}
     more["cures"] = cures_of(answer.result, _given(stage))
     case = answer.result[_given(stage)]
     more |= {"certain": case.judgement.hunting.certain, "in_short": verdict_in_short(case)}
@@ -702,9 +702,10 @@ def _given(stage: Stage) -> str:
     return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
 
 
-def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return label and verdict for each state of the joint that the stage can have."""
-    return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
+def _told(stage: Stage, verdicts: Mapping[str, str]) -> AnswerPart:
+    """Return label and verdict for each state of the joint that the stage can have, and those of the state it is in."""
+    cases = [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
+    return {"cases": cases, "verdict": verdicts[_given(stage)], "state": LABELS[_given(stage)] if stage.joint else ""}
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
