@@ -5,7 +5,11 @@ import pytest
 from book import BOOK
 
 import friso
+from friso.equations.bandwidth import sped_up
 from friso.hunting import check_given
+from friso.remedies.method import tune
+from friso.stage import Stage
+from friso.virtual_rig.cures import cures, edges, is_quiet, judged
 from friso.virtual_rig.run import as_built_keys, run_flat
 from friso.virtual_rig.task import motion_task
 from friso.virtual_rig.verdict import PLACES, Built, judge_as_built
@@ -59,3 +63,58 @@ def test_its_swing_is_that_of_a_long_run() -> None:
 def test_what_alone_makes_it_differ(changes: dict[str, object], verdict: str, because: tuple[str, ...]) -> None:
     judged = built(changes)
     assert (judged.verdict, judged.certain, judged.because) == (verdict, True, because)
+
+
+@pytest.mark.parametrize(
+    ("changes", "moves"),
+    [
+        ({"drive.encoder_noise": "0.1 mrad"}, {"hunts", "rests", "open"}),
+        ({"motion.duration": "10 ms"}, {"hunts"}),
+        ({"motion.duration": "100000 s"}, {"hunts", "open"}),
+        ({"controller.force_limit": "0.05 N*m"}, {"rests"}),
+    ],
+    ids=["noise", "a run of five samples", "a run of years", "a motor that cannot break it away"],
+)
+def test_runs_are_followed_however_long_their_motion(changes: dict[str, object], moves: set[str]) -> None:
+    """A motor too weak to break the stage away winds up, but never makes it slip."""
+    judged = built(changes)
+    assert {*judged.moves} <= moves
+    assert judged.certain == (len(moves) == 1)
+
+
+def test_a_stage_that_hunts_at_some_places_alone_is_not_certain() -> None:
+    """Whether it hunts then depends on where its target lies between two counts."""
+    judged = built({"drive.encoder_resolution": "0.75 mrad"})
+    assert {"hunts", "rests"} <= {*judged.moves}
+    assert not judged.certain
+
+
+def test_a_finer_encoder_with_a_dead_band_of_its_count_cures_it_where_the_dead_band_alone_does_not() -> None:
+    """Its integral winds between two counts of any encoder."""
+    (cure,) = cures(COUNTS)
+    drive = cure.stage.flat()
+    assert (cure.kind, drive["drive.encoder_resolution"]) == ("a finer encoder", drive["drive.integrator_deadband"])
+    assert cure.built.rest_error
+    assert cure.built.rest_error <= drive["drive.encoder_resolution"]
+    assert judged(COUNTS.replace({"drive.encoder_resolution": "0.75 mrad"})).verdict == "hunts"
+
+
+@pytest.mark.slow
+def test_what_tune_advises_holds_as_built() -> None:
+    """Faster it settles in continuous time, but still hunts between its counts."""
+    advice = tune(COUNTS, chosen={"bandwidth"})
+    (outcome,) = advice.outcomes
+    assert "as built" in advice.unmet
+    assert (outcome.certainty, outcome.doubts) == ("unsure", ("as built",))
+
+
+@pytest.mark.slow
+def test_sampling_moves_the_edge_of_the_rig_upwards(locked: Stage) -> None:
+    """With its joint locked it hunts below 9.75 Hz in continuous time. A sample of 1 ms costs phase."""
+    stage = locked.replace({"drive": {"sample_time": "1 ms"}})
+    edge = edges(check_given(stage))["bandwidth"].above
+    assert edge
+    assert edge.certain
+    assert edge.inside * 8 > 9.75
+    for factor, quiet in ((edge.inside, False), (edge.outside, True)):
+        assert is_quiet(judged(stage.with_numbers(sped_up(stage.flat(), factor)))) == quiet

@@ -36,12 +36,14 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.roles import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
+from friso.questions.check.built_words import built_in_short
 from friso.questions.logs.question import LogsAnswer, options_of
 from friso.questions.map.cells import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
 from friso.shown.motion_words import COLOURS, LABELS, case_labels, verdict_in_short
 from friso.shown.text import after_loop, lost_as_built, unknown_condition
 from friso.stage import Stage
+from friso.stage.rig import is_as_built
 from friso.stage.stage import numeric_keys
 from friso.studies.metric import metrics
 
@@ -240,7 +242,8 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
     lost = lost_as_built(stage)
     short = after_loop(f"{words[_given(stage)]}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
-    certain = {"certain": not stage.doubt and not lost, "in_short": short}
+    time = "in continuous time: " if is_as_built(stage) and not lost else ""
+    certain = {"certain": not stage.doubt and not lost, "in_short": time + short}
     yield {"kind": "answer", **_told(stage, words), **certain}
 
 
@@ -251,10 +254,13 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     answer = KEPT.answer(friso.check, asked.machine, work, options)
     cases = {name: case.verdict for name, case in answer.result.items()}
     stage = asked.machine.stage
-    more = {**_told(stage, cases), **_lines("check", asked, options)}
+    more = {**_told(stage, cases), "verdict": answer.verdict, **_lines("check", asked, options)}
     more["cures"] = cures_of(answer.result, _given(stage))
-    case = answer.result[_given(stage)]
-    more |= {"certain": case.judgement.hunting.certain, "in_short": verdict_in_short(case)}
+    case, built = answer.result[_given(stage)], answer.as_built
+    certain, short = (case.judgement.hunting.certain, verdict_in_short(case))
+    if built:
+        certain, short = built.certain, built_in_short(built)
+    more |= {"certain": certain, "in_short": short}
     yield parts_of(answer, ghosts, **more)
 
 

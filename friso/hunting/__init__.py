@@ -21,7 +21,15 @@ from friso.hunting.boundary import (
     diagram,
     plane,
 )
-from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
+from friso.hunting.cases import (
+    LONG_RUN_RTOL,
+    Case,
+    Solver,
+    check,
+    check_given,
+    least_breakaway_force,
+    needed_kernels,
+)
 from friso.hunting.cycle.ensemble import Ensemble, stuck, wait
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, Multipliers, find_cycles, multipliers
 from friso.hunting.cycle.guess import ReturnMap
@@ -126,6 +134,7 @@ __all__ = [
     "judge_runs",
     "kernels_to_judge",
     "lasting_swings",
+    "least_breakaway_force",
     "loops_unstable",
     "moves_that_hunt",
     "multipliers",

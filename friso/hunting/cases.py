@@ -265,7 +265,7 @@ def _case(
         judgement = judgement.uncertain(stage.doubt)
         static_friction = static_friction and static_friction.uncertain()
     faster, slower = advised(stage, judgement, lost, static_friction, work)
-    breakaway = _breakaway(flat)
+    breakaway = least_breakaway_force(flat)
     # parts left out without an attractor count as done, too
     done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)
     return Case(
@@ -330,7 +330,7 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     return limit if abs(force) > limit * (1 - LIMIT_FORCE_SHARE) or (possible and limit < breakaway) else None
 
 
-def _breakaway(flat: Mapping[str, Any]) -> float:
+def least_breakaway_force(flat: Mapping[str, Any]) -> float:
     """Return the smallest actuator force [N] that may move a sticking stage; 0 without friction.
 
     Constant forces may help the actuator, and friction may be smaller in one direction. `flat` has the stage's keys in

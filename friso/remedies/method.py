@@ -23,6 +23,7 @@ from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.frequency.bode import Limits, limits, loop_bandwidth
 from friso.hunting import Case
+from friso.hunting.criteria import ATTRACTED
 from friso.platform.installed import missing
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import (
@@ -49,7 +50,9 @@ from friso.remedies.verified import (
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.stage.correlations import Correlations
-from friso.stage.rig import AS_BUILT, motion_of
+from friso.stage.rig import AS_BUILT, is_as_built, motion_of
+from friso.virtual_rig.cures import Cure, cures, is_quiet, judged
+from friso.virtual_rig.verdict import Built
 
 PARTS = ("joint.", "flexure.")
 """Prefixes of keys that describe parts to be bought."""
@@ -146,9 +149,10 @@ class Advice:
     parts of the goal that it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits`
     gives the bandwidths with enough margin. `interrupted` is true if the search was ended early.
 
-    The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
-    written. `cap` is how much faster the controller could become. `unmade` gives the reason why no leaf springs make
-    the joint of a remedy.
+    The tables `as_built` are used to verify what works, not in the search; they and the `correlations` are added to
+    stage files that are written. `cap` is how much faster the controller could become. `built` is the verdict on the
+    stage as built (None: its file describes no drive), and `cures` are changes of its drive that stop its hunting.
+    `unmade` gives the reason why no leaf springs make the joint of a remedy.
     """
 
     stage: Stage
@@ -165,6 +169,8 @@ class Advice:
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
     unmet: tuple[str, ...] = ()
     cap: SpeedCap = field(default_factory=lambda: SpeedCap(LARGEST_SPEED_FACTOR, "stated"))
+    built: Built | None = None
+    cures: tuple[Cure, ...] = ()
 
     @property
     def needed(self) -> bool:
@@ -181,10 +187,7 @@ class Advice:
 
         Tables that belong to another controller are left out.
         """
-        try:
-            return tuned.replace(self.as_built)
-        except StageError:
-            return tuned
+        return _complete(tuned, self.as_built)
 
     def size(self, outcome: RemedyOutcome) -> ChangeSize:
         """Return how large the change by a remedy is, for an outcome that has settings."""
@@ -211,6 +214,19 @@ class Advice:
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs, or None."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
+
+
+def _complete(tuned: Stage, as_built: Mapping[str, Any]) -> Stage:
+    """Return a tuned stage with the tables `as_built`; without them if they belong to another controller."""
+    try:
+        return tuned.replace(as_built)
+    except StageError:
+        return tuned
+
+
+def _as_built(stage: Stage) -> dict[str, Any]:
+    """Return the tables of a stage that describe the real machine."""
+    return {name: table for name, table in stage.as_written().items() if name in AS_BUILT}
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
@@ -303,6 +319,7 @@ def tune(
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report, answered)
     work = TUNING_WORK
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
+    built, cured = None, tuple[Cure, ...]()
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
             session.tries(listed.pop(0))
@@ -315,8 +332,11 @@ def tune(
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
         unmet = missed_parts(present, goal) or unsettled_parts(confirmed(ideal, goal), present, goal)
-        if not unmet and case.verdict in ("hunts", "bistable"):
+        if not unmet and case.verdict in ATTRACTED:
             unmet = ("verdict",)
+        built = judged(stage) if is_as_built(stage) else None
+        hunts_as_built = built is not None and built.verdict in ATTRACTED
+        unmet = (*unmet, *["as built"] * hunts_as_built)
         if not unmet:
             listed = []  # nothing has to change
         for joint in (False, True):
@@ -324,6 +344,9 @@ def tune(
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.makes_leaves()
+        if hunts_as_built and chosen is None:
+            report("the drive of the stage as it is")
+            cured = tuple(cures(stage))
     except KeyboardInterrupt:
         interrupted = True
         session.interrupted()
@@ -337,11 +360,13 @@ def tune(
         machines=fresh,
         seed=seed,
         interrupted=interrupted,
-        as_built={name: table for name, table in stage.as_written().items() if name in AS_BUILT},
+        as_built=_as_built(stage),
         correlations=correlations,
         unmade=session.unmade,
         unmet=unmet,
         cap=cap,
+        built=built,
+        cures=cured,
     )
 
 
@@ -571,6 +596,9 @@ class _Session:
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
+        if not doubted and is_as_built(complete := _complete(tuned, _as_built(self.drive))):
+            self.report(f"{remedy.name}: verified as built")
+            doubted = () if is_quiet(judged(complete)) else ("as built",)
         parts = remedy, tuned, measured, confirmation, doubted, search.points, search.attracted
         return RemedyOutcome(*parts, shares=shares)
 

@@ -12,23 +12,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from friso.engine.arrays import Status
-from friso.engine.batch import usual_interval
 from friso.equations import motion
 from friso.errors import InputError
-from friso.hunting import Case, LoopState, resting
+from friso.hunting import Case, LoopState, least_breakaway_force
 from friso.hunting.criteria import ATTRACTED, Verdict
-from friso.hunting.measures import LAST_HALF, LAST_QUARTER
+from friso.hunting.measures import bands_of
 from friso.shown.text import lost_as_built
+from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.rig import Floor, is_as_built
-from friso.virtual_rig.run import as_built_keys, run_flat, with_complete_drive
+from friso.virtual_rig.followed import Bounds, Fate, FollowedRuns, follow, runs_to_their_end, size_of_rest
+from friso.virtual_rig.run import as_built_keys, with_complete_drive
 from friso.virtual_rig.task import MoveTask, motion_task
-
-Fate = Literal["hunts", "toggles", "rests", "runs away", "open", "failed"]
-"""What a run does in the end.
-
-It swings by more than a count, swings by at most one, rests, or diverges. It is open what it does, or the run failed.
-"""
 
 
 @dataclass(frozen=True)
@@ -37,11 +31,13 @@ class Built:
 
     - `verdict`: "hunts", "bistable", "toggles" (it swings by at most a count), "settles", "undecided" or "failed" (its
       run did, or it runs away).
-    - `certain`: every run was followed until it rested, or surely did not.
+    - `certain`: every run was followed until it rested, or surely did not, and none rests of a stage that "hunts".
     - `amplitude` [m], `period` [s]: least and largest of the runs that swing, (2,) each; None if none does.
     - `moves`, `kicks`: how many of the runs have each `Fate`.
     - `smallest_kick`, `runs_away_after` [m]: smallest displacement tried that starts hunting, or after which the stage
       runs away (None: none).
+    - `rest_error` [m], `settled_after` [s]: the largest of moves that rest or toggle: error in the end, and time after
+      the motion until it stays within the stage's tolerance (inf: it does not). None if none rests.
     - `followed` [s]: the longest time after the last corner of the reference.
     - `slips_after` [s]: time at which a winding integral would break a resting stage away (None: it does not wind).
     - `because`: what alone makes the verdict differ from the continuous machine's, in words.
@@ -57,6 +53,8 @@ class Built:
     kicks: Mapping[Fate, int]
     smallest_kick: float | None
     runs_away_after: float | None
+    rest_error: float | None
+    settled_after: float | None
     followed: float
     slips_after: float | None
     differs: bool = False
@@ -73,23 +71,6 @@ KICKS = 8
 KICK_RANGE = (4.0, 128.0)  # [smallest swing that is told from rest]
 """Smallest and largest kick, unless the motion is longer: its size then is the largest."""
 
-SAMPLES = 1e7
-"""Samples of the drive over which all runs together are followed. More take longer than the rest of a check."""
-
-LONGER = 4.0
-"""Factor by which an undecided run is followed longer."""
-
-
-@dataclass(frozen=True)
-class _Runs:
-    """Runs that were followed: fate, swing [m], period [s], time to the next slip [s], time followed [s], (n,)."""
-
-    fate: np.ndarray
-    swing: np.ndarray
-    period: np.ndarray
-    slips_after: np.ndarray
-    followed: np.ndarray
-
 
 def judge_as_built(case: Case) -> Built | None:
     """Judge the stage of a `case` of the check as built.
@@ -100,55 +81,64 @@ def judge_as_built(case: Case) -> Built | None:
     if not is_as_built(stage) or case.verdict == "none":
         return None
     flat = as_built_keys(stage)
-    size = _size_of_rest(flat)
-    task, kicks = _task(flat, size, case)
-    runs = _follow(flat, stage.floor, task, size, case.breakaway, SAMPLES)
+    swing = case.judgement.swing.amplitude if case.judgement.swing else 0.0
+    task, kicks, bounds = tried(flat, stage.floor, swing)
+    runs = follow(flat, task, bounds)
+    built = replace(seen(runs, kicks, stage.doubt), unstable=lost_as_built(stage))
+    attracted = case.verdict in ATTRACTED
+    if built.verdict in ("undecided", "failed") or (built.verdict in ATTRACTED) == attracted:
+        return built
+    unlike = np.flatnonzero((runs.fate == "hunts") != attracted)
+    if case.verdict == "bistable" and swing:
+        far = np.abs(np.log(np.abs(kicks) / swing))
+        unlike = PLACES + np.argsort(far)
+    one = replace(task.of_runs(unlike[:1]), duration=float(task.pieces[0, -1, 0] + runs.followed[unlike[0]]))
+    hunting = swing if attracted and swing else float(runs.swing[unlike[0]]) / 2
+    because = _reasons(flat, one, bounds, int(unlike[0]), QUIET_SHARE * hunting, attracted)
+    return replace(built, differs=True, because=because)
+
+
+def seen(runs: FollowedRuns, kicks: np.ndarray, doubt: str = "") -> Built:
+    """Return the verdict that follows from runs: of moves, the own one first, and of kicks [m], (KICKS,).
+
+    It is not certain of a stage in `doubt`.
+    """
     moves, kicked = runs.fate[:PLACES], runs.fate[PLACES:]
     swings = runs.fate == ("hunts" if "hunts" in runs.fate else "toggles")
     winding = runs.slips_after[(runs.fate == "rests") & np.isfinite(runs.slips_after)]
-    sure = moves[0] == "hunts" or not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
-    built = Built(
+    followed = not (np.isin(runs.fate, ("open", "failed")).any() or winding.size)
+    sure = (moves == "hunts").all() or (followed and moves[0] != "hunts")
+    rests = np.isin(moves, ("rests", "toggles"))
+    return Built(
         verdict=_verdict(moves, kicked),
-        certain=not stage.doubt and bool(sure),
+        certain=not doubt and bool(sure),
         amplitude=_ends(runs.swing[swings] / 2),
         period=_ends(runs.period[swings]),
         moves=_counted(moves),
         kicks=_counted(kicked),
         smallest_kick=_smallest(kicks[kicked == "hunts"]),
         runs_away_after=_smallest(kicks[kicked == "runs away"]),
-        followed=float(np.nanmax(runs.followed)),
+        rest_error=_largest(runs.error[:PLACES][rests]),
+        settled_after=_largest(runs.settled[:PLACES][rests]),
+        followed=float(np.nanmax(runs.followed, initial=0.0)),
         slips_after=_smallest(winding),
-        unstable=lost_as_built(stage),
     )
-    attracted = case.verdict in ATTRACTED
-    if built.verdict in ("undecided", "failed") or (built.verdict in ATTRACTED) == attracted:
-        return built
-    unlike = np.flatnonzero((runs.fate == "hunts") != attracted)
-    if case.verdict == "bistable" and case.judgement.swing:
-        far = np.abs(np.log(np.abs(kicks) / case.judgement.swing.amplitude))
-        unlike = PLACES + np.argsort(far)
-    one = replace(task.of_runs(unlike[:1]), duration=float(task.pieces[0, -1, 0] + runs.followed[unlike[0]]))
-    swing = case.judgement.swing.amplitude if attracted and case.judgement.swing else float(runs.swing[unlike[0]]) / 2
-    because = _reasons(flat, stage.floor, one, size, case.breakaway, QUIET_SHARE * swing, attracted)
-    return replace(built, differs=True, because=because)
 
 
-def _size_of_rest(flat: Mapping[str, Any]) -> float:
-    """Return the largest swing [m], peak to peak, that is no hunting: a count and the noise, as far as a drive sees."""
-    seen = flat["drive.encoder_resolution"] + NOISE_WIDTH * flat["drive.encoder_noise"]
-    return max(float(seen), float(resting(flat)[0]))
+def _largest_force(flat: Mapping[str, Any]) -> float:
+    """Return the largest force [N] that the motor exerts, wherever it stands; inf without a limit."""
+    motor = flat["drive.motor_constant_ratio"] * (1 + abs(flat.get("drive.ripple", 0.0)))
+    return float(flat.get(FORCE_LIMIT, np.inf) * motor)
 
 
-NOISE_WIDTH = 10.0  # [RMS]
-"""Width of noise, peak to peak. Of a million samples none lies beyond."""
+def tried(flat: Mapping[str, Any], floor: Floor | None, swing: float = 0.0) -> tuple[MoveTask, np.ndarray, Bounds]:
+    """Return the moves and kicks that are run, the kicks' sizes [m], (KICKS,), and what tells the runs apart.
 
-
-def _task(flat: Mapping[str, Any], size: float, case: Case) -> tuple[MoveTask, np.ndarray]:
-    """Return the moves and kicks that are run, and the kicks' sizes [m], (KICKS,).
-
-    A move that leads to another place in a count also begins there: it is the whole motion that lies elsewhere on the
-    encoder.
+    `flat` has the complete keys of a machine on a `floor`, which may hunt with an amplitude of `swing` [m]. A move that
+    leads to another place in a count also begins there: it is the whole motion that lies elsewhere on the encoder.
     """
+    size, least = size_of_rest(flat), least_breakaway_force(dict(flat))
+    bounds = Bounds(floor, size, least if _largest_force(flat) >= least else np.inf, bands_of(flat)[0])
     task = motion_task(flat, 1)
     one = task.pieces.reshape(-1, *task.pieces.shape[-2:])[0]
     pieces = np.repeat(one[None], PLACES + KICKS, axis=0)
@@ -157,130 +147,10 @@ def _task(flat: Mapping[str, Any], size: float, case: Case) -> tuple[MoveTask, n
     places = np.arange(PLACES) / PLACES * flat["drive.encoder_resolution"]
     pieces[:PLACES, :, 1] += places[:, None]
     pieces[PLACES:, :, 1:] = one[-1, 1:]
-    swing = case.judgement.swing
-    largest = max(KICK_RANGE[1] * size, float(np.max(motion.size(flat))), 2 * swing.amplitude if swing else 0.0)
+    largest = max(KICK_RANGE[1] * size, float(np.max(motion.size(flat))), 2 * swing)
     kicks = np.geomspace(KICK_RANGE[0] * size, largest, KICKS) * np.where(np.arange(KICKS) % 2, -1.0, 1.0)
     displacements = np.concatenate([sides * float(np.max(task.displacement)), kicks])
-    return replace(task, pieces=pieces, displacement=displacements), kicks
-
-
-def _follow(
-    flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, size: float, breakaway: float, samples: float
-) -> _Runs:
-    """Run a task until each run rests or surely does not, over at most so many samples of the drive in all.
-
-    `size` [m] is the largest swing of a stage at rest, and `breakaway` [N] the least force that moves it.
-    """
-    count, step = len(task.pieces), float(np.min(flat["drive.sample_time"]))
-    corner = float(np.max(task.pieces[:, -1, 0]))
-    runs = _Runs(np.full(count, "open", object), *(np.full(count, np.nan) for _ in range(4)))
-    left, after = np.arange(count), task.duration - corner
-    if count * task.duration > samples * step:
-        after = max(samples * step / FIRST_SHARE / count - corner, after / LONGER**2)
-    while left.size and (affordable := int(samples * step / (corner + after)) // TOGETHER * TOGETHER):
-        left = left[:affordable]
-        part = {key: value[left] if np.ndim(value) else value for key, value in flat.items()}
-        some = _of(part, floor, replace(task.of_runs(left), duration=corner + after), size, breakaway)
-        for name, column in vars(runs).items():
-            column[left] = getattr(some, name)
-        samples -= -(-left.size // TOGETHER) * TOGETHER * (corner + after) / step
-        after *= LONGER
-        left = left[(some.fate == "open") | ((some.fate == "rests") & (some.slips_after < after))]
-    return runs
-
-
-TOGETHER = 8
-"""Number of runs that take hardly longer than one."""
-
-FIRST_SHARE = 3.0
-"""Part of the samples that runs take at first, if the motion lasts too long to be run whole: a third."""
-
-
-SLOWEST_SLIP = 86400.0  # [s]
-"""Longest time to a slip that counts. Nobody waits longer."""
-
-JUDGED_PERIODS = 3.0
-"""Periods of a swing in the last half of a run that show that it lasts."""
-
-LASTING_SHARE = 0.8
-"""Least ratio of the swing over the last quarter of a run to that over the last half, for it to last."""
-
-
-def _of(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, size: float, breakaway: float) -> _Runs:
-    """Run a task once, and say what each run does in the end."""
-    count, step, corner = (
-        len(task.pieces),
-        float(np.min(flat["drive.sample_time"])),
-        float(np.max(task.pieces[:, -1, 0])),
-    )
-    interval = max(1, round(usual_interval(task.duration) / step)) * step
-    several = [*run_flat(flat, floor, task, [0] * count, interval)]
-    position, reference, force, reading = (
-        np.concatenate([getattr(one, kind)[name] for one in several])
-        for kind, name in (("true", "position"), ("logged", "reference"), ("logged", "force"), ("logged", "position"))
-    )
-    time, statuses = several[0].time, np.concatenate([one.statuses for one in several])
-    done, away = statuses == Status.DONE, statuses == Status.DIVERGED
-    deviation, followed = position - reference, time[-1] - corner
-    half, quarter = (time >= corner + share * followed for share in (LAST_HALF, LAST_QUARTER))
-    swing, earlier = (np.ptp(deviation[:, part], axis=1) for part in (quarter, half))
-    period, turned = _periods(time[half], deviation[:, half])
-    resolution, noise = (np.asarray(flat[f"drive.encoder_{name}"]) for name in ("resolution", "noise"))
-    least = np.maximum(resolution, np.abs(reading - reference)[:, -1])
-    slips = _time_to_slip(time[quarter], force[:, quarter], position[:, quarter], breakaway, least)
-    lasting = (swing > size) & (swing >= LASTING_SHARE * earlier) & (time[-1] - turned <= period)
-    sure, still = lasting & (JUDGED_PERIODS * period <= followed / 2), (earlier <= size) & (slips > 0)
-    flipping, flipped = _periods(time[half], np.where(noise > 0, 0.0, 1.0) * reading[:, half])
-    toggles = still & (resolution > 0) & (time[-1] - flipped <= 2 * flipping)
-    fates = {"runs away": away, "failed": ~done, "hunts": sure, "toggles": toggles, "rests": still}
-    fate = np.select([*fates.values()], [*fates], "open").astype(object)
-    return _Runs(
-        fate,
-        swing,
-        np.where(toggles, flipping, period),
-        np.where(fate == "rests", slips, np.inf),
-        np.full(count, followed),
-    )
-
-
-def _periods(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean period of swings [s] and the last time [s] at which they turned, from times (n,) and values.
-
-    Both have the shape (runs,). A swing crosses the middle half of the range between the values, of shape (runs, n).
-    """
-    periods, turned = np.full(len(values), np.nan), np.full(len(values), -np.inf)
-    for run, row in enumerate(values):
-        low, high = row.min(), row.max()
-        side = np.sign(row - (low + high) / 2) * (np.abs(row - (low + high) / 2) > (high - low) / 4)
-        away = np.flatnonzero(side)
-        crossed = away[1:][np.diff(side[away]) != 0]
-        if len(crossed) > 2:
-            whole = crossed[(len(crossed) - 1) % 2 :]
-            periods[run] = 2 * (time[whole[-1]] - time[whole[0]]) / (len(whole) - 1)
-            turned[run] = time[crossed[-1]]
-    return periods, turned
-
-
-DRIFT_SHARE = 0.4
-"""Least drift of the force between the halves of a record, as a share of its width, for it to wind. It is a half for
-a force that rises evenly."""
-
-
-def _time_to_slip(
-    time: np.ndarray, force: np.ndarray, position: np.ndarray, breakaway: float, least: np.ndarray
-) -> np.ndarray:
-    """Return the time [s] in which a force [N] that winds evenly breaks a stage away, inf if it does not, (runs,).
-
-    It does not if the stage yields by `least` [m] before: its reading then changes, and the force turns. Forces and
-    positions [m] have the shape (runs, n).
-    """
-    half = len(time) // 2
-    drift, yielded = (part[:, half:].mean(axis=1) - part[:, :half].mean(axis=1) for part in (force, position))
-    with np.errstate(all="ignore"):
-        winds = (drift != 0) & (np.abs(drift) >= DRIFT_SHARE * np.ptp(force, axis=1)) & (breakaway > 0)
-        rest = np.maximum(breakaway - np.sign(drift) * force[:, -1], 0.0) / np.abs(drift)
-        after = rest * (time[half:].mean() - time[:half].mean())
-        return np.where(winds & (np.abs(yielded) * rest < least) & (after < SLOWEST_SLIP), after, np.inf)
+    return replace(task, pieces=pieces, displacement=displacements), kicks, bounds
 
 
 def _verdict(moves: np.ndarray, kicks: np.ndarray) -> Verdict | Literal["toggles"]:
@@ -288,10 +158,10 @@ def _verdict(moves: np.ndarray, kicks: np.ndarray) -> Verdict | Literal["toggles
     own = moves[0]
     if own in ("hunts", "failed", "runs away"):
         return "hunts" if own == "hunts" else "failed"
-    if own == "open":
-        return "undecided"
-    if "hunts" in moves or "hunts" in kicks:
+    if own != "open" and ("hunts" in moves or "hunts" in kicks):
         return "bistable"
+    if own == "open" or np.count_nonzero(moves == "open") >= len(moves) / 2:
+        return "undecided"
     return "toggles" if "toggles" in moves else "settles"
 
 
@@ -302,6 +172,11 @@ def _counted(fates: np.ndarray) -> dict[Fate, int]:
 def _smallest(values: np.ndarray) -> float | None:
     """Return the smallest of some values, whatever their signs; None if there are none."""
     return float(np.abs(values).min()) if values.size else None
+
+
+def _largest(values: np.ndarray) -> float | None:
+    """Return the largest of some values; None if there are none."""
+    return float(values.max()) if values.size else None
 
 
 def _ends(values: np.ndarray) -> tuple[float, float] | None:
@@ -363,18 +238,12 @@ QUIET_SHARE = 0.2
 
 
 def _reasons(
-    flat: Mapping[str, Any],
-    floor: Floor | None,
-    task: MoveTask,
-    size: float,
-    breakaway: float,
-    quiet: float,
-    attracted: bool,
+    flat: Mapping[str, Any], task: MoveTask, bounds: Bounds, seed: int, quiet: float, attracted: bool
 ) -> tuple[str, ...]:
     """Return what alone makes a run differ from the continuous machine's, which is `attracted` to hunting or not.
 
-    The run has a `task` of its own, as long as it had to be followed, and does not hunt if it swings by at most `quiet`
-    [m], peak to peak.
+    The run has a `task` of its own, as long as it had to be followed, and a `seed`. It does not hunt if it swings by at
+    most `quiet` [m], peak to peak.
     """
     for parts in _without(flat):
         changed = {key: np.full(len(parts), flat[key]) for keys in parts.values() for key in keys if key in flat}
@@ -385,7 +254,7 @@ def _reasons(
         machines = with_complete_drive({**flat, **changed, **timing})
         copies = task.of_runs(np.zeros(len(parts), int))
         try:
-            runs = _of(machines, floor, copies, size, breakaway)
+            runs = runs_to_their_end(machines, copies, bounds, np.full(len(parts), seed))
         except InputError:  # a delay of more samples than a machine may have
             continue
         alike = runs.fate == "hunts" if attracted else runs.swing <= quiet

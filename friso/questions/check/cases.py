@@ -288,7 +288,7 @@ def case_document(case: hunting.Case) -> dict[str, Any]:
         "margin": _margin(judgement.margin) if judgement.margin else None,
         "windows": _bandwidths(judgement.windows),
         "settles_below": _end(judgement.lower),
-        "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
+        "static_friction": margin_document(case.static_friction) if case.static_friction else None,
         "advice": {"faster": _advice(case.faster), "slower": _advice(case.slower)},
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
@@ -369,7 +369,7 @@ def _advice(advice: hunting.BandwidthAdvice | None) -> dict[str, Any] | None:
     return advice and entries(advice, "factor", "just_beyond", "keeps_friction")
 
 
-def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
+def margin_document(margin: hunting.ParameterMargin) -> dict[str, Any]:
     """Return the multiples of a parameter at which hunting begins or ends.
 
     Each end has the last multiple with an unchanged verdict and the next multiple with another verdict.
@@ -398,7 +398,7 @@ def joint_margins_document(stage: Stage, margins: Mapping[str, hunting.Parameter
     """Return the margins of a stage in the keys of its joint, as multiples and as values."""
     document, flat, fields = {}, stage.flat(), stage.numeric_keys()
     for key, margin in margins.items():
-        entry, unit = _parameter_margin(margin), unit_suffix(fields[key].unit)
+        entry, unit = margin_document(margin), unit_suffix(fields[key].unit)
         for end in filter(None, (entry["below"], entry["above"])):
             end |= {f"{name}{unit}": end[f"{name}_at_factor"] * flat[key] for name in ("same", "other")}
         document[key.removeprefix("joint.")] = {f"yours{unit}": flat[key], **entry}

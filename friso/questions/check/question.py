@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from friso.engine.batch import SIMULATION_RTOL, simulate
@@ -22,8 +23,8 @@ from friso.interface.inputs import LOGGER, Changes, LengthLike, Seed, StageLike,
 from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import NOTHING
-from friso.questions.check.built_words import built_document, built_sentences
-from friso.questions.check.cases import case_document, peaks_shown, rows, rows_behind
+from friso.questions.check.built_words import built_document, built_margin_sentences, built_sentences
+from friso.questions.check.cases import case_document, margin_document, peaks_shown, rows, rows_behind
 from friso.questions.check.draws import (
     draws_colours,
     draws_details,
@@ -86,8 +87,8 @@ class CheckAnswer(Answer):
 
     `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` are the results on machines
     drawn from uncertain keys, or None. `as_built` is the verdict on the stage with its drive, or None if the file
-    describes none. `cut` is true if Ctrl-C left some machines undrawn. `laws` holds the verdicts
-    under all friction laws, or None.
+    describes none, and `built_margins` how far that holds, by parameter, if asked for. `cut` is true if Ctrl-C left
+    some machines undrawn. `laws` holds the verdicts under all friction laws, or None.
     """
 
     stage: Stage
@@ -96,6 +97,7 @@ class CheckAnswer(Answer):
     cut: bool
     stage_file: str = ""
     as_built: Built | None = None
+    built_margins: Mapping[str, ParameterMargin] = MappingProxyType({})
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that says what stops the hunting, for a file of a stage that hunts."""
@@ -190,6 +192,7 @@ def check(
     draws: Whole | None = None,
     seed: Seed = 0,
     laws: bool = False,
+    as_built: bool = False,
     within: LengthLike | None = None,
     progress: Progress = silent,
 ) -> CheckAnswer:
@@ -202,6 +205,8 @@ def check(
         as many as a fixed work allows, some tens, and none if the loop is unstable.
     laws : bool
         Give also the verdict under other friction laws, which keep what was measured as far as they can.
+    as_built : bool
+        Find also by how much bandwidth and static friction may change before the machine as built does something else.
 
     Returns
     -------
@@ -226,7 +231,7 @@ def check(
     tolerance = inputs.tolerance_of(rtol)
     correlations, file = inputs.correlations_of(stage, chosen), inputs.file_of(stage, set)
     chosen = inputs.with_tolerance(chosen, within)
-    return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file)
+    return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file, as_built)
 
 
 MOST_DRAWS = 100_000
@@ -242,11 +247,13 @@ def checked_stage(
     laws: bool = False,
     progress: Progress = silent,
     stage_file: str = "",
+    as_built: bool = False,
 ) -> CheckAnswer:
     """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
     `draws` is the number of machines; by default, as many as a fixed work allows, and none if the loop is unstable.
-    With `laws`, the stage is checked under other friction laws, too. `tolerance` is that of the solver.
+    With `laws`, the stage is checked under other friction laws, too; with `as_built`, edges of hunting are found by
+    runs of the machine with its drive. `tolerance` is that of the solver.
     `stage_file` is its path as a word of a command line. Raises InputError for a number of draws that is not usable.
     """
     loose = max(tolerance, LONG_RUN_RTOL)
@@ -264,11 +271,15 @@ def checked_stage(
     kernels(needed_kernels(chosen))
     inputs.mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
-    built = None
+    built, margins = None, dict[str, ParameterMargin]()
     if is_as_built(chosen):
         from friso.virtual_rig.verdict import judge_as_built
 
         built = judge_as_built(cases["given"])
+    if built and as_built:
+        from friso.virtual_rig.cures import edges
+
+        margins = edges(cases["given"])
     drawn = across = None
     cut = False
     if uncertain is not None and cases["given"].unstable:
@@ -291,7 +302,8 @@ def checked_stage(
         from friso.studies.laws import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
-    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut, stage_file=stage_file, as_built=built)
+    parts = {"draws": drawn, "laws": across, "cut": cut, "as_built": built, "built_margins": margins}
+    return CheckAnswer(cases, stage=chosen, stage_file=stage_file, **parts)
 
 
 def _as_drawn(case: Case, draws: Draws, name: str) -> Case:
@@ -356,9 +368,12 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     says, colours = [*_verdicts(check), *motion_sentences(stage), *notes], [item.colour for item in cases]
     if built := check.as_built:
         yield AnswerBlock(
-            sentences=built_sentences(built),
+            sentences=[
+                *built_sentences(built, ", at the centre of its ranges" if draws else ""),
+                *built_margin_sentences(stage, check.built_margins),
+            ],
             colours=[COLOURS["given"]],
-            numbers=lambda: _built_document(built, check.result["given"]),
+            numbers=lambda: _built_document(check, built),
         )
     if draws:
         yield AnswerBlock(sentences=says, colours=[] if check.cut else draws_colours(draws))
@@ -427,10 +442,12 @@ def _figures(check: CheckAnswer) -> Sequence[Figure]:
     return check_figures(check.traced)
 
 
-def _built_document(built: Built, given: Case) -> dict[str, Any]:
+def _built_document(check: CheckAnswer, built: Built) -> dict[str, Any]:
     """Return the verdict as built beside that in continuous time."""
+    given = check.result["given"]
     continuous = {"verdict": given.verdict, "certain": given.judgement.hunting.certain}
-    return plain_json({"as_built": built_document(built), "continuous": continuous})
+    margins = {name.replace(" ", "_"): margin_document(margin) for name, margin in check.built_margins.items()}
+    return plain_json({"as_built": {**built_document(built), **margins}, "continuous": continuous})
 
 
 def _cases_document(check: CheckAnswer) -> dict[str, Any]:

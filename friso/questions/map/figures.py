@@ -31,6 +31,7 @@ from friso.questions.map.findings import message, own_values, second_scale, stat
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, pick
 from friso.shown.drawing.figure import BLUE, Axis, Cloud, Figure, Map, Markers, Panel, Series, Told
+from friso.stage.rig import is_as_built
 from friso.studies.edges import MapEdges
 from friso.studies.metric import metrics
 
@@ -73,7 +74,7 @@ def map_figure(
     return Figure(
         name=f"map-{metric}",
         title=title,
-        caption=" ".join(filter(None, [caption or f"Every cell is one {_subject(metric)}.", _told_of(runs, rerun)])),
+        caption=f"{caption or f'Every cell is one {_subject(metric, runs)}.'} {_told_of(runs, rerun)}".strip(),
         panels=tuple(panels),
         columns=columns,
         subject=subject_of(runs),
@@ -110,9 +111,12 @@ def _told_of(runs: xr.Dataset, rerun: str) -> str:
     return f"{told} {fewer}".strip()
 
 
-def _subject(metric: str) -> str:
-    """Return what a cell of a map represents: one run, or the stage under any motion."""
-    return "stage" if metric in metrics() and metrics()[metric].source != "run" else "run"
+def _subject(metric: str, runs: xr.Dataset) -> str:
+    """Return what a cell of a map represents: one run, or the stage under any motion, whose drive is left out."""
+    if metric not in metrics() or metrics()[metric].source == "run":
+        return "run"
+    stage = machine_of(runs)
+    return f"stage{', in continuous time' * (stage is not None and is_as_built(stage))}"
 
 
 def map_panel(

@@ -19,6 +19,7 @@ from friso.engine.batch import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.loops import response
 from friso.frequency.system import DriveTiming, limit_cases
+from friso.questions.check.built_words import built_document
 from friso.questions.export.words import rows as gain_rows
 from friso.questions.tune.words import (
     COLUMNS,
@@ -54,6 +55,7 @@ from friso.shown.drawing.figure import (
 from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
+from friso.virtual_rig.cures import Cure
 
 
 def gain_lines(tuning: Advice) -> list[str]:
@@ -303,9 +305,16 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "modulus_margin": goal.margin,
             },
             "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
+            "as_built": tuning.built and built_document(tuning.built),
+            "cures": {cure.kind: _cure(cure, tuning) for cure in tuning.cures},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
         }
     )
+
+
+def _cure(cure: Cure, tuning: Advice) -> dict[str, Any]:
+    """Return a cure of the drive: what it changes, and what the machine as built then does."""
+    return {"changes": changes(tuning.complete(tuning.stage), cure.stage), **built_document(cure.built)}
 
 
 def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:

@@ -24,6 +24,7 @@ DOUBTS = {
     "settling": "too many of the machines are not in position in time",
     "margin": "too many of the machines have less modulus margin than wanted",
     "force": "too many of the machines take more force than there is",
+    "as built": "as built, with its drive, it hunts, or may",
     "together": "too many of the machines miss one part of the goal or another",
 }
 """Why a stage is not sure to meet the goal."""

@@ -135,7 +135,7 @@ def tune(
     >>> import friso
     >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
     """
-    chosen = inputs.read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
+    chosen = inputs.read_stage(stage, set, leaves_out=(), uncertain_too=True)
     goal = _goal(chosen, within, settle, moves, force_limit, bandwidth_limit, margin, only, keep)
     correlations = inputs.correlations_of(stage, chosen)
     if missing("design"):

@@ -51,6 +51,7 @@ from friso.shown.text import (
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.tables import leading_friction
+from friso.virtual_rig.cures import Cure
 
 COLUMNS = ("Set to", "Works", "95 % settle within", "Largest {effort}", "Modulus margin")
 
@@ -154,6 +155,22 @@ def _modes_unknown(tuning: Advice) -> bool:
     return tuning.stage.parasitic is None and not tuning.stage.flexure and tuning.goal.bandwidth_limit is None
 
 
+def cure_words(tuning: Advice, cure: Cure) -> str:
+    """Say what to set in the drive, and where and when the machine as built then rests."""
+    set_to, built = listed(changes(tuning.complete(tuning.stage), cure.stage), "and"), cure.built
+    rests = "toggles by a count" if built.verdict == "toggles" else "rests"
+    off = f" within {with_unit(built.rest_error, 'm')}" if built.rest_error else ""
+    late = built.settled_after
+    when = f", {with_unit(late, 's')} after the motion at the latest" if late and math.isfinite(late) else ""
+    return f"{cure.kind} stops the hunting as built: set {set_to}; it then {rests}{off}{when}"
+
+
+def _cures(tuning: Advice) -> str:
+    """Say what each cure of the drive sets and brings."""
+    texts = [cure_words(tuning, cure) for cure in tuning.cures]
+    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
+
+
 def _first_modes(tuning: Advice) -> str:
     """Ask to look at the modes of the machine before its bandwidth is raised, where none is known."""
     if not _modes_unknown(tuning) or _first(tuning).remedy.buys_joint:
@@ -242,6 +259,9 @@ _WORDS: Words[Advice] = {
     "as_it_is": lambda of: as_it_is(of),
     "limit": lambda of: Quantity("N", positive, "200 N").on(of.stage.axis_kind).example,
     "rest": _rest,
+    "parts": lambda of: listed(["the controller"] * of.goal.controller + ["the joint"] * of.goal.joint, "or"),
+    "cures": _cures,
+    "cure": lambda of: cure_words(of, of.cures[0]),
     "part": lambda of: "joint" if of.goal.controller else "controller",
 }
 
@@ -258,6 +278,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
             "{changes}.",
         ),
         (lambda of: of.working, "Set {changes}: the cheapest change that works{for_all}{so_far} ({name})."),
+        (lambda of: of.cures, "No change of {parts} was found that surely works; of the drive, {cure}."),
         (_unsure, "No change was found that surely works; {name} might ({changes}), but {why}."),
         (always, "No change was found that surely meets the goal."),
     ),
@@ -270,6 +291,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
         (lambda of: not of.needed, ""),
         (lambda of: not of.working and of.goal.controller and cap_words(of), "Not tried: {cap}; for that, {state}."),
         (lambda of: not of.working, ""),
+        (lambda of: of.cures, "Or of the drive: {cure}."),
         (lambda of: of.working[1:], "{second}"),
         (always, "{as_it_is}"),
     ),
@@ -279,8 +301,9 @@ _SAYS: Sequence[Alternatives[Advice]] = (
 _EXPLAINED: Alternatives[Advice] = (
     (lambda of: not of.working, "{rest}"),
     (lambda of: of.needed, "{as_it_is}"),
+    (lambda of: of.cures, "{cures}"),
     (always, "The goal: {goal}."),
-    (_drive_timed, "The [drive] of the file counts for the margin alone, not for moves and hunting."),
+    (_drive_timed, "The [drive] of the file counts for the margin and the verdict as built, not for moves."),
     (
         _modes_unknown,
         "Not known: modes of the machine. None is assumed; they make fast controllers unstable.",
@@ -538,6 +561,10 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
             row = _row(outcome.measured, tuning, _set_to(tuning.stage, outcome.stage), works)
             row[1] = row[1] if outcome.remedy.verifiable else works
             table.append((outcome.remedy.name, row))
+    before = tuning.complete(tuning.stage)
+    for cure in tuning.cures:
+        time_to_rest = NOTHING if cure.built.settled_after is None else time(cure.built.settled_after)
+        table.append((cure.kind, [_set_to(before, cure.stage), "as built", time_to_rest, NOTHING, NOTHING]))
     return table
 
 
