@@ -46,6 +46,7 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.roles import sidecar
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Panel, Series
+from friso.stage.controllers import controller_of
 from friso.studies.sweep import local_crew
 
 RIG = Path(friso.example("thesis_rig"))
@@ -385,8 +386,8 @@ LOG = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k
 
 
 def test_what_is_wrong_or_names_a_file_is_refused(served: Served) -> None:
-    (part,) = served.ask("machine", RIG, {"masses.cart": "3 N"})
-    assert (part["kind"], part["key"]) == ("refused", "masses.cart")
+    opened, part = served.ask("machine", RIG, {"masses.cart": "3 N"})
+    assert (part["kind"], part["key"], opened["toml"]) == ("refused", "masses.cart", friso.load(RIG).to_toml())
     for question in ("check", "map", "boundary", "tune", "design", "run"):
         for options in ({"out": "/tmp/x"}, {"spec": "/etc/passwd"}, {"export": ["/tmp/x.csv"]}):
             assert served.ask(question, RIG, {}, **options)[-1]["kind"] == "refused"
@@ -576,6 +577,27 @@ def test_every_example_is_shown(name: str) -> None:
     for table in tables.values():
         values = {key["path"].split(".")[1]: key["value"] for key in table["keys"] if key["value"] is not None}
         assert values == written[table["name"]]
+
+
+@pytest.mark.parametrize("name", ["thesis_rig", "robot_wrist", "twincat_cascade", "controllers/state_space"])
+def test_every_kind_of_controller_can_be_chosen_and_keeps_crossover_and_limit(served: Served, name: str) -> None:
+    """It is the crossover of the gains; from a kind by gains to another, these stay, too."""
+    path, limit = Path(friso.example(name)), {"controller.force_limit": "90 N*m" if "wrist" in name else "90 N"}
+    before = friso.load(path).replace(limit).flat()
+    pid = controller_of(before).as_pid(before)
+    (part,) = served.ask("machine", path, limit)
+    (kind,) = (key for table in part["tables"] for key in table["keys"] if key["path"] == "controller.kind")
+    assert len(kind["options"]) == 6
+    for chosen in kind["options"]:
+        (part,) = served.ask("controller", path, limit, name=chosen)
+        changes = limit | part["changes"]
+        machine = Machine.of({"text": path.read_text(encoding="utf-8"), "changes": changes})
+        flat, (shown,) = machine.stage.flat(), served.ask("machine", path, changes)
+        assert {key["own"] for table in shown["tables"] for key in table["keys"] if "own" in key} == {chosen}
+        now = controller_of(flat).as_pid(flat)
+        assert (now.crossover, flat["controller.force_limit"]) == (pytest.approx(pid.crossover, rel=1e-3), 90.0)
+        assert chosen in ("pid by crossover", "adrc") or now[:3] == pytest.approx(pid[:3], rel=2e-3)
+    assert served.ask("controller", path, name="nothing")[-1]["kind"] == "refused"
 
 
 def test_a_run_is_that_of_friso(served: Served) -> None:

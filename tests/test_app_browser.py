@@ -291,6 +291,7 @@ def test_ask(browsed: Browsed) -> None:
     browsed.says("Locked (as given): hunts")
     page.click("#verdict button:text-is('Free the joint')")
     browsed.verdict("settles")
+    assert page.inner_text("#verdict strong").lower() == "free: settles"
     assert browsed.changes()["joint.locked"] is False
     page.click("#verdict button:text-is('Take back: Free the joint')")
     browsed.says("Locked (as given): hunts")
@@ -352,6 +353,16 @@ def test_edit(unchecked: Browsed) -> None:
     browsed.type("9")
     browsed.field("9 Hz")
     assert browsed.changes() == {"controller.crossover": "9 Hz"}
+    page.select_option("#key-controller-kind", "transfer_function")
+    page.wait_for_selector("#keys >> text=In the text")
+    page.select_option("#key-controller-kind", "cascade")
+    page.wait_for_function("() => document.querySelector('#key-controller-kv')?.value === '17.88 1/s'")
+    page.select_option("#key-controller-kind", "pid by crossover")
+    browsed.field("9 Hz")
+    for _ in range(3):
+        page.click("#undo")
+    assert browsed.changes() == {"controller.crossover": "9 Hz"}
+    browsed.field("9 Hz")
     browsed.type_meanwhile("11 Hz", "10.5 H")
     page.keyboard.type("z")
     page.keyboard.press("Enter")
@@ -408,6 +419,11 @@ def test_edit(unchecked: Browsed) -> None:
     page.wait_for_selector(f"{ROW} .wrong", state="detached")
     page.click("#undo")  # one pull is one step
     page.wait_for_selector(f"{ROW} .wrong")
+    page.click("[data-part=stage]")
+    page.reload()
+    page.wait_for_selector(f"{ROW} .wrong")
+    assert page.input_value(FIELD) == "3 kg"
+    assert page.is_disabled("#out")
     page.click("#undo")
     page.wait_for_selector(f"{ROW} .wrong", state="detached")
     browsed.field("11 Hz")
@@ -732,7 +748,7 @@ def test_hostile(browsed: Browsed, chromium: Any, tmp_path: Path) -> None:
     shown = page.inner_text("body")
     assert escaped(shown) == shown
 
-    page.evaluate(LINK, {"masses.cart": [1]})
+    page.evaluate(LINK, {"masses.cart": [[1]]})
     page.wait_for_selector("#trouble:not([hidden])")
     page.evaluate(LINK, None)
     page.wait_for_selector("#machines >> text=linked")

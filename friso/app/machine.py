@@ -28,9 +28,11 @@ from friso.interface.answer import Answer
 from friso.interface.starting import stage_schema
 from friso.platform.leftovers import temporary_folder
 from friso.platform.system import name_refused, remove_folder, shell_word
-from friso.quantities import Number, Quantity, as_toml
+from friso.quantities import Number, Quantity, as_toml, exactly
 from friso.shown.blocks import pictures
-from friso.stage import Stage, loads, numeric_keys
+from friso.stage import ControllerSection, Stage, loads, numeric_keys
+from friso.stage.controllers import CONTROLLERS, KIND, controller_of
+from friso.stage.section import numeric_fields
 
 MOST_BYTES = 64_000_000
 """Largest size of a log in bytes."""
@@ -143,7 +145,7 @@ class Machine:
             raise InputError("machine", type(data).__name__, "the text of a stage file, and the keys changed")
         changes = data.get("changes") or {}
         if not isinstance(changes, Mapping) or not all(isinstance(value, _VALUES) for value in changes.values()):
-            raise InputError("changes", "other values", "texts, numbers, true or false, by key")
+            raise InputError("changes", "other values", "texts, numbers, arrays, true or false, by key")
         name = plain_name(str(data.get("name") or ""), "stage.toml")
         return cls(data["text"], name, json.dumps(changes), data.get("made") is True)
 
@@ -178,7 +180,7 @@ class Machine:
         return _stage(self)
 
 
-_VALUES = (str, bool, int, float, type(None))
+_VALUES = (str, bool, int, float, list, type(None))
 
 
 MOST_KEPT = 16
@@ -231,6 +233,37 @@ def machine_on_page(machine: Machine) -> dict[str, Any]:
     }
 
 
+def controllers() -> dict[str, type[ControllerSection]]:
+    """Return the classes of controllers by what the page calls them: their kind, and the key by which it is given."""
+    forms = ((kind, form) for kind, of_kind in CONTROLLERS.forms.items() for form in of_kind)
+    return {" by ".join([kind, *form.recognised_by[:1]]): form for kind, form in forms}
+
+
+def as_controller(stage: Stage, name: str) -> dict[str, Any]:
+    """Return the changed keys, None for keys to remove, that give a stage the controller called `name`.
+
+    What both controllers have stays; the others' keys follow from the gains of the present one, or are the examples of
+    the new one. Raises InputError for an unknown name.
+    """
+    if name not in controllers():
+        raise InputError(KIND, name[:60], f"one of {', '.join(controllers())}")
+    form, flat = controllers()[name], stage.flat()
+    own, written, axis = controller_of(flat), stage.as_written()["controller"], stage.axis_kind
+    pid, fields = own.as_pid(flat), numeric_fields(form)
+    alike = [key for key in form.model_fields if numeric_fields(own).get(key) == fields.get(key)]
+    values: dict[str, Any] = dict.fromkeys(key for key in written if key not in alike)
+    values |= {"kind": name.partition(" by ")[0]}
+    for key, field in form.model_fields.items():
+        if field.is_required() and key != "kind" and values.get(key, written.get(key)) is None:
+            example = fields[key].on(axis).example if key in fields else "0"
+            values[key] = float(example) if isinstance(fields.get(key), Number) else example
+    for key, value in (form.like_pid(pid) if pid else {}).items():
+        unit = getattr(fields.get(key), "unit", "")
+        number = float(f"{value:.4g}") or None if isinstance(value, float) else value  # 0 is what absent gains are
+        values[key] = exactly(number, axis.unit(unit)) if unit and number else number
+    return {form.key(key): value for key, value in values.items()}
+
+
 def _variant(node: Mapping[str, Any], present: Mapping[str, Any]) -> Mapping[str, Any]:
     """Choose, among the schemas that a table may have, the one that the stage file uses.
 
@@ -265,6 +298,9 @@ def _key(
     about = {"path": path, "value": value, "description": node.get("description", ""), "kind": _kind(node)}
     about |= {"options": node.get("enum", []), "example": (node.get("examples") or [""])[0]}
     about["plain"] = path not in uncertain
+    if path == KIND:
+        own, about["kind"] = controller_of(flat), "controller"
+        about |= {"options": [*controllers()], "own": next(k for k, form in controllers().items() if form is own)}
     if field is not None:
         about |= {"unit": field.unit, "si": flat.get(path), "example": field.example}
         if isinstance(flat.get(path), float):

@@ -40,7 +40,7 @@ from friso.questions.check.built_words import built_in_short
 from friso.questions.logs.question import LogsAnswer, options_of
 from friso.questions.map.cells import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
-from friso.shown.motion_words import COLOURS, case_labels, verdict_in_short
+from friso.shown.motion_words import COLOURS, LABELS, case_labels, verdict_in_short
 from friso.shown.text import after_loop, lost_as_built, unknown_condition
 from friso.stage import Stage
 from friso.stage.rig import is_as_built
@@ -128,12 +128,25 @@ def words_of(answer: Answer) -> AnswerPart:
 
 
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the machine's keys, the metrics of maps, and questions of installed packages."""
+    """Yield the machine's keys, the metrics of maps, and questions of installed packages.
+
+    If a changed key is wrong, the keys of the file as it was opened come before the error.
+    """
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
     in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # metrics in words first
     shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in in_order]}
-    yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
+    try:
+        yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
+    except InputError:
+        yield {"kind": "partly", **shown, **machines.machine_on_page(replace(asked.machine, changed="{}"))}
+        raise
+
+
+def controller(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """Yield the keys that change if the machine has another kind of controller."""
+    name = str(asked.chosen("name").get("name"))
+    yield {"kind": "answer", "changes": machines.as_controller(asked.machine.stage, name)}
 
 
 def others_of_stages() -> list[str]:
@@ -227,11 +240,11 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
         words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
-    word, lost = words[_given(stage)], lost_as_built(stage)
-    short = after_loop(f"{word}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
+    lost = lost_as_built(stage)
+    short = after_loop(f"{words[_given(stage)]}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
     time = "in continuous time: " if is_as_built(stage) and not lost else ""
     certain = {"certain": not stage.doubt and not lost, "in_short": time + short}
-    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": word, **certain}
+    yield {"kind": "answer", **_told(stage, words), **certain}
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -241,7 +254,7 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     answer = KEPT.answer(friso.check, asked.machine, work, options)
     cases = {name: case.verdict for name, case in answer.result.items()}
     stage = asked.machine.stage
-    more = {"cases": _labelled(stage, cases), "verdict": answer.verdict, **_lines("check", asked, options)}
+    more = {**_told(stage, cases), "verdict": answer.verdict, **_lines("check", asked, options)}
     more["cures"] = cures_of(answer.result, _given(stage))
     case, built = answer.result[_given(stage)], answer.as_built
     certain, short = (case.judgement.hunting.certain, verdict_in_short(case))
@@ -548,6 +561,7 @@ def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
 
 QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "machine": machine,
+    "controller": controller,
     "run": run,
     "cell": cell,
     "verdict": verdict,
@@ -565,7 +579,7 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 }
 """The functions that answer questions, by name."""
 
-QUICK = frozenset({"machine"})
+QUICK = frozenset({"machine", "controller"})
 """The questions that need no computation."""
 
 FIRST = frozenset({"verdict", "run", "cell", "loops", "bode", "flexure", "map"})
@@ -694,9 +708,10 @@ def _given(stage: Stage) -> str:
     return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
 
 
-def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return label and verdict for each state of the joint that the stage can have."""
-    return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
+def _told(stage: Stage, verdicts: Mapping[str, str]) -> AnswerPart:
+    """Return label and verdict for each state of the joint that the stage can have, and those of the state it is in."""
+    cases = [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
+    return {"cases": cases, "verdict": verdicts[_given(stage)], "state": LABELS[_given(stage)] if stage.joint else ""}
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:

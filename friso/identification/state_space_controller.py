@@ -9,10 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import field_validator
 
-from friso.equations.controllers.rational import RationalController, TransferRoots
+from friso.equations.controllers.rational import FACTORS, RationalController, TransferRoots, with_filter
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import register_controller
+from friso.stage.controllers import PidLike
 
 NAMES = ("a", "b", "c", "d")
 
@@ -37,6 +38,13 @@ class StateSpace(RationalController):
     @classmethod
     def _is_found_from_anywhere(cls, file: str | None) -> str | None:
         return None if file is None else str(Path(file).absolute())
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return the matrices in s: an integral, and the filter of the derivative."""
+        tau = with_filter(pid)
+        c, d = f"{pid.ki:.6g} {-pid.kd / tau**2:.6g}", f"{pid.kp + pid.kd / tau:.6g}"
+        return {"a": f"0 0; 0 {-1 / tau:.6g}", "b": "1; 1", "c": c, "d": d, "file": None, **FACTORS}
 
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:

@@ -500,6 +500,21 @@ class Gain(NamedTuple):
     unit: str
 
 
+class PidLike(NamedTuple):
+    """Gains kp [N/m], ki [N/(m s)], kd [N s/m] and filter time tau [s] of a PID controller that acts on a mass [kg]."""
+
+    kp: float
+    ki: float
+    kd: float
+    tau: float
+    mass: float
+
+    @property
+    def crossover(self) -> float:
+        """Return the frequency [Hz] at which the derivative, or without one the proportional gain, holds the mass."""
+        return (self.kd / self.mass if self.kd else sqrt(self.kp / self.mass)) / (2 * pi)
+
+
 class ControllerSection(AgainstFriction):
     """Base of the controllers.
 
@@ -624,6 +639,16 @@ class ControllerSection(AgainstFriction):
         Each has the keys of the stage file that change: numbers [SI] as floats, texts, or None for keys to remove.
         There may be none.
         """
+        return {}
+
+    @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike | None:
+        """Return the PID controller that acts alike, or nearly; None for a kind that does not say."""
+        return None
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return keys by name [SI], None for keys to leave out, that act as a PID controller does, or nearly."""
         return {}
 
     @classmethod

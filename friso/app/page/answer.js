@@ -26,7 +26,7 @@ function show(version, answer, newCases, newRest) {
   const ways = (answer.cures ?? []).map(({ label, values }) => el("button", { type: "button", class: "cure", onclick: () => cures.set(label, values) }, label));
   const back = taken ? [el("button", { type: "button", class: "cure", onclick: cures.back }, `Take back: ${taken}`)] : [];
   const short = (answer.in_short ?? "none").replace(answer.verdict, WORDS[answer.verdict] ?? answer.verdict);
-  const said = short === "none" ? [] : [el("strong", { class: answer.certain && !short.startsWith("unstable") ? answer.verdict : "" }, short)];
+  const said = short === "none" ? [] : [el("strong", { class: answer.certain && !short.startsWith("unstable") ? answer.verdict : "" }, answer.state ? `${answer.state}: ${short}` : short)];
   word.replaceChildren(...said, ...ways, ...back);
   cases.replaceChildren(...newCases);
   if (newRest) rest.replaceChildren(...newRest);

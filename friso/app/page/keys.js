@@ -72,7 +72,9 @@ function drawn(place, machine, part, changed, wrong, tell) {
 export function refuse(place, wrong) {
   place.querySelectorAll(".wrong").forEach((item) => item.remove());
   for (const item of place.querySelectorAll("[data-path]")) {
-    if (wrong?.keys.includes(item.dataset.path)) item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
+    if (!wrong?.keys.includes(item.dataset.path)) continue;
+    item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
+    item.closest("details")?.toggleAttribute("open", true);
   }
 }
 
@@ -89,6 +91,9 @@ function row(key, machine, changed, tell) {
     const options = key.options.map((word) => el("option", { value: word, selected: word === value }, word));
     if (value === undefined || value === null) options.unshift(el("option", { value: "", selected: true }, "–"));
     item.append(el("select", { id, onchange: (event) => event.target.value && tell.set(key.path, event.target.value) }, ...options));
+  } else if (key.kind === "controller") {
+    const options = key.options.map((name) => el("option", { value: name, selected: name === key.own }, name));
+    item.append(el("select", { id, onchange: (event) => tell.controller(event.target.value) }, ...options));
   } else if (key.kind === "array") {
     item.append(el("button", { id, type: "button", onclick: () => tell.edit() }, "In the text"));
   } else {

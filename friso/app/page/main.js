@@ -1,7 +1,7 @@
 // The page: connects the machine, its keys, the answer and the pictures.
 import * as answers from "./answer.js";
 import { $, anew, el, plain, tabs } from "./dom.js";
-import { drawing } from "./drawing.js";
+import { drawing, PARTS } from "./drawing.js";
 import { alongTracks, colourTracks, edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
@@ -84,19 +84,26 @@ function follow(dragged) {
 function described(part, version) {
   const { machine } = version;
   if (part.kind === "answer") version.described = part;
-  if (part.kind !== "message") version.settle(part);
+  if (part.kind === "partly") version.opened = part;
+  if (part.kind !== "message" && part.kind !== "partly") version.settle(part);
   if (machine !== machines.current()) return; // another one is shown by now, and asked about
   if (part.kind === "refused" || part.kind === "failed") {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
-    if (!shown || held !== machine.text) return without(part, version);
+    if (!shown || held !== machine.text) {
+      without(part, version);
+      if (!version.opened) return;
+      [shown, seen, held] = [version.opened, version, machine.text]; // its wrong key can be set here
+      forgetRanges();
+      chosen = PARTS.find(({ tables }) => tables.includes(wrong.keys[0].split(".")[0]))?.id ?? chosen;
+    }
     usable();
     left();
     if (!$("keys").querySelector(".wrong")) answers.refused(part.text, version);
     return;
   }
   if (part.kind !== "answer") return;
-  const opened = held !== machine.text;
+  const opened = held !== machine.text || !pictures.machine;
   const another = wrong !== null || opened;
   wrong = null;
   shown = part;
@@ -178,12 +185,21 @@ function left() {
   drawn = { machine, part: chosen };
   keys($("keys"), shown, chosen, machines.changes(), wrong, {
     set: (path, value, dragged = false) => machine === machines.current() && set({ [path]: value }, dragged),
+    controller: changeController,
     hold: machines.hold,
     release: machines.release,
     edit: editText,
   });
   mark($("keys"), now(), FIELDS);
   if (tracked.version && isNow(tracked.version)) colourTracks(tracked.tracks);
+}
+
+/** Set the keys with which the machine has another kind of controller. */
+async function changeController(name) {
+  const version = now();
+  const part = await ask("controller", { machine: version.sent, options: { name } }, "controller");
+  if (part?.kind === "answer" && isNow(version)) set(part.changes);
+  else left(); // the kind is as it was
 }
 
 /** The text of the machine as it is set now, which the server may not have written yet. */

@@ -202,7 +202,7 @@ window.addEventListener("storage", ({ key, newValue }) => {
   save();
 });
 
-const isChanges = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((item) => item === null || typeof item !== "object");
+const isChanges = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((item) => item === null || typeof item !== "object" || (Array.isArray(item) && item.every(Number.isFinite)));
 const isMachine = ({ name, text, steps, step }) => typeof name === "string" && typeof text === "string" && steps.every(isChanges) && isChanges(steps[step]);
 
 /** A link that holds the machine: behind #, which browsers send nowhere. */

@@ -10,13 +10,15 @@ Gautier, Brunot 2019) and of drives in general (Gross, Hamann, Wiegaertner 2001,
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import sqrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from friso.equations.controllers.pid import SYMBOLS, fed_forward, feedforward_of_moves
 from friso.quantities import Number, Quantity, Value, any_sign, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
-from friso.stage.controllers import Gain
+from friso.stage.controllers import Gain, PidLike
+from friso.stage.tables import moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -167,6 +169,23 @@ class Cascade(ControllerSection):
             gone = {POSITION_TIME: None, VELOCITY_TIME: None, PROPORTIONAL_ON: "error"}
             listed["no integral"] = {key: value for key, value in gone.items() if key in flat and flat[key] != value}
         return listed
+
+    @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
+        """Return the PID controller with its derivative on the measurement that both loops make."""
+        kv, kp = flat[cls.key("kv")], flat[KP]
+        inner, outer = (1 / flat[key] if key in flat else 0.0 for key in (VELOCITY_TIME, POSITION_TIME))
+        return PidLike(kp * (kv + inner), kp * kv * (inner + outer), kp, flat[VELOCITY_FILTER], moving_mass(flat))
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return the loops that make a PID controller, the faster one outside; {} without a derivative."""
+        if not pid.kd or not pid.kp:
+            return {}
+        half = pid.kp / (2 * pid.kd)
+        root = sqrt(max(half**2 - pid.ki / pid.kd, 0.0))
+        time = {"velocity_integral_time": 1 / (half - root)} if pid.ki else {}
+        return {"kv": half + root, "kp": pid.kd, "velocity_filter": pid.tau, **time}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:

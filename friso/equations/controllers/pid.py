@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 from friso.errors import StageError
 from friso.quantities import Number, Quantity, Value, any_sign, at_least_1, inside_0_1, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
-from friso.stage.controllers import KIND, Gain
+from friso.stage.controllers import KIND, Gain, PidLike
 from friso.stage.tables import TIME_ROUNDING, moving_mass
 
 if TYPE_CHECKING:
@@ -175,6 +175,16 @@ class VanDijk(Pid):
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
+
+    @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
+        """Return the gains of Eq. 6."""
+        return PidLike(**as_gains(**numbers(flat)), mass=flat[TUNED_MASS])
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return the crossover."""
+        return {"crossover": pid.crossover}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
@@ -351,6 +361,17 @@ class DisturbanceRejection(ControllerSection):
         return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
+        """Return gains by van Dijk's rules for the crossover of the loop."""
+        crossover = flat[BANDWIDTH] * crossing_ratio(flat[OBSERVER_RATIO])
+        return VanDijk.as_pid(tuned(crossover, 0.1, 2.0, flat[TUNED_MASS]))
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return the bandwidth with which the loop has the same crossover."""
+        return {"bandwidth": pid.crossover / crossing_ratio(5.0), "observer_ratio": 5.0}
+
+    @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """Return the controller's keys, and the bandwidth of the observer."""
         observer = flat[BANDWIDTH] * flat[OBSERVER_RATIO]
@@ -515,6 +536,17 @@ class PidGains(Pid):
         elif flat[KP] and flat[KD]:
             listed["with an integral"] = {KI: flat[KP] ** 2 / flat[KD] / INTEGRAL_TIME_FACTOR}
         return listed
+
+    @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
+        """Return the gains."""
+        return PidLike(flat[KP], flat[KI], flat[KD], flat[TAU], moving_mass(flat))
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return the gains; without a filter, the derivative acts on the measurement."""
+        on = {} if pid.tau or not pid.kd else {"derivative_on": "measurement"}
+        return {"kp": pid.kp, "ki": pid.ki, "kd": pid.kd, "tau": pid.tau, **on}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:

@@ -20,7 +20,7 @@ from pydantic import model_validator
 from friso.errors import InputError, StageError
 from friso.quantities import Number, Quantity, Value, positive
 from friso.stage import register_controller
-from friso.stage.controllers import CONTROLLER, FILTER_ARRAY, ControllerSection
+from friso.stage.controllers import CONTROLLER, FILTER_ARRAY, ControllerSection, PidLike
 from friso.stage.section import (
     Coefficients,
     OneTable,
@@ -32,7 +32,7 @@ from friso.stage.section import (
     element_keys,
     row_keys,
 )
-from friso.stage.tables import TIME_ROUNDING
+from friso.stage.tables import TIME_ROUNDING, moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -170,6 +170,17 @@ class RationalController(ControllerSection):
     def stiffness(cls, blocks: Blocks, variant: RationalTerms) -> sp.Expr:
         """Return the static stiffness in parallel with the integral [N/m]."""
         return blocks.key("gain") * blocks.key(f"{PARTS}.stiffness")
+
+    @classmethod
+    def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
+        """Return the gains at low frequencies."""
+        speed, first = flat[cls.key("speed")], {"a1": 0.0, "b1": 0.0}
+        for name in first:
+            places = (key for key in flat if key.startswith(cls.key(f"{PARTS}.")) and key.endswith(f".{name}"))
+            first[name] = sum(flat[key] for key in places) / speed
+        kp = flat[cls.key("gain")] * flat[cls.key(f"{PARTS}.stiffness")]
+        ki = flat[cls.key("gain")] * speed * flat.get(cls.key(f"{PARTS}.integral"), 0.0)
+        return PidLike(kp, ki, kp * max(first["b1"] - first["a1"], 0.0), first["a1"], moving_mass(flat))
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
@@ -356,6 +367,15 @@ def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -
     return TransferRoots(np.roots(upper), np.roots(lower), float(upper[0] / lower[0]))
 
 
+FACTORS = dict.fromkeys(("gain", "speed", "sample_time"))
+"""Keys that change a transfer function in s; without them it is as its coefficients say."""
+
+
+def with_filter(pid: PidLike) -> float:
+    """Return the time [s] of the filter that makes a PID controller proper: its own, or a tenth of kd/kp."""
+    return pid.tau or (pid.kd / pid.kp / 10 if pid.kp and pid.kd else 1e-3)
+
+
 WAYS = ("denominator", "poles", "sections")
 """Keys of which each selects one way to give a transfer function."""
 
@@ -401,6 +421,13 @@ class TransferFunction(RationalController):
         if self.poles is not None and self.denominator is None and "gain" not in self.model_fields_set:
             raise StageError("gain", "nothing", "the gain before the product of zeros over poles, in SI", "gain = 2e3")
         return self
+
+    @classmethod
+    def like_pid(cls, pid: PidLike) -> dict[str, Any]:
+        """Return numerator and denominator in s."""
+        tau = with_filter(pid)
+        numerator = [pid.kp * tau + pid.kd, pid.kp + pid.ki * tau, pid.ki]
+        return {"numerator": numerator, "denominator": [tau, 1.0, 0.0], **FACTORS}
 
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
