@@ -463,7 +463,7 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
         return f"somewhere between {low} and {high}"
     text, error = _edge_and_error(case, end)
-    return f"{text}{_within(error)}"
+    return f"{text} (at the centre of its ranges)" if case.stage.uncertain() else f"{text}{_within(error)}"
 
 
 def _edge_and_error(case: Case, end: AttractionEnd) -> tuple[str, float]:
