@@ -214,3 +214,11 @@ def test_friction_beyond_the_force_limit_is_told_as_that(force_limit: str | None
     says = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert says[0].startswith("Hunts")
     assert any("force limit" in text and "6.70 N" in text for text in says) == held
+
+
+@pytest.mark.parametrize(("factor", "quiet", "at"), [(0.99, 1.01, True), (0.98, 0.99, False), (1.0, 1.01, False)])
+def test_a_stage_between_the_ends_of_an_edge_lies_at_it(factor: float, quiet: float, at: bool) -> None:
+    margin = Margin(factor, None, False, quiet)
+    assert replace(settles(), margin=margin).at_an_edge == at
+    window = BandwidthWindow(None, AttractionEnd(factor, quiet, False))
+    assert replace(settles(), windows=(window,)).at_an_edge == at

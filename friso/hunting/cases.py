@@ -19,6 +19,7 @@ from friso.equations.structure import structure
 from friso.hunting.attractors.rounds import RUN_TURNING_POINTS
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import HuntingDoubt
 from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
@@ -261,6 +262,8 @@ def _case(
             static_friction = friction_margin(stage, judgement)
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
+    if judgement.at_an_edge:
+        judgement = replace(judgement, hunting=replace(judgement.hunting, certain=False, reason=HuntingDoubt.EDGE))
     if stage.doubt:
         judgement = judgement.uncertain(stage.doubt)
         static_friction = static_friction and static_friction.uncertain()

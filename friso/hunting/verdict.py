@@ -110,6 +110,16 @@ class Judgement:
     given_up: tuple[CheckPart, ...] = ()
 
     @property
+    def at_an_edge(self) -> bool:
+        """Tell whether the stage lies between the ends of an edge of hunting in bandwidth."""
+        ends = [
+            self.margin and self.margin.end,
+            self.lower,
+            *(end for one in self.windows for end in (one.low, one.high)),
+        ]
+        return any(min(end.inside, end.outside) < 1 < max(end.inside, end.outside) for end in ends if end)
+
+    @property
     def swing(self) -> Cycle | Swing | None:
         """Return the attractor: a cycle, or else an observed swing; None if there is none."""
         return next(iter((*self.hunting.attracting, *self.hunting.observed)), None)

@@ -38,6 +38,7 @@ class HuntingDoubt(StrEnum):
     WORK = f"deciding takes {MORE_WORK}"
     RUNS = "runs that had to decide were stopped, or contradict each other or orbits followed from other bandwidths"
     MOTION = "this motion was not seen to end at rest or in a swing that was found to attract"
+    EDGE = "its own bandwidth lies between the ends of an edge of hunting"
     BEYOND = "swings smaller or larger than those searched may last"
     GROWTH = "without anti-windup swings may grow or die out beyond the force limit: a size is where a run was stopped"
     LOOP = "its loop is unstable, or its controller pushes ever harder at standstill as an integral does"
