@@ -135,6 +135,7 @@ def fake_stage(
         note="",
         unknown_keys=(),
         assumed_keys=(),
+        uncertain=dict,
         friction=object(),
         states_friction=True,
         doubt="",
