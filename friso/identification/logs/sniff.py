@@ -146,10 +146,10 @@ def _values(texts: Any, form: NumberFormat) -> np.ndarray:
     """Return the values of texts that are numbers in a format."""
     texts = texts.str.replace(form.grouping, "", regex=False) if form.grouping else texts
     texts = texts.str.replace(form.decimal, ".", regex=False)
-    words = {
-        word: value for name, value in (("true", "1"), ("false", "0")) for word in (name, name.title(), name.upper())
-    }
-    return as_numbers(texts.replace(words).str.replace(r"(?<=[\d.])[dD]", "e", regex=True))
+    for name, value in (("true", "1"), ("false", "0")):
+        if texts.isin([name, name.title(), name.upper()]).any():
+            texts = texts.str.replace(f"^{name}$", value, case=False, regex=True)
+    return as_numbers(texts.str.replace(r"(?<=[\d.])[dD]", "e", regex=True))
 
 
 def as_numbers(texts: Any) -> np.ndarray:

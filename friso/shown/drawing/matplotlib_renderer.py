@@ -314,7 +314,7 @@ def image(figure: Figure, form: str, headed: bool = True) -> bytes:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(IMAGE_FORMATS)}, e.g. 'png'")
     with _style(), _letters_alone() if form == "pdf" else nullcontext():
         canvas, stream = _laid_out(figure), io.BytesIO()
-        cut = 0.0 if headed else _header_height(canvas.get_suptitle())
+        cut = 0.0 if headed else round(_header_height(canvas.get_suptitle()) * DOTS_PER_INCH) / DOTS_PER_INCH
         area = Bbox([[0, 0], [FIGURE_WIDTH, canvas.get_figheight() - cut]])
         dots = DOTS_PER_INCH if form == "png" else FINER_FACTOR * DOTS_PER_INCH  # resolution of pictures inside
         canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area if cut else None, dpi=dots)
