@@ -118,3 +118,25 @@ def test_sampling_moves_the_edge_of_the_rig_upwards(locked: Stage) -> None:
     assert edge.inside * 8 > 9.75
     for factor, quiet in ((edge.inside, False), (edge.outside, True)):
         assert is_quiet(judged(stage.with_numbers(sped_up(stage.flat(), factor)))) == quiet
+
+
+def test_friction_holds_a_sampled_loop_up_to_a_displacement() -> None:
+    """A force held for a sample feeds a swing, and friction takes from it: by harmonic balance both are equal at X.
+
+    The loop of a gain alone is unstable with its samples (Budai et al. 2019, doi 10.1007/s11071-019-05101-7).
+    """
+    gain, sample, mass, coulomb = 5.0, 0.02, 0.02, 0.05
+    friction = {"model": "lugre", "static": "0.05 N*m", "coulomb": f"{coulomb} N*m", "stribeck_velocity": "0.05 rad/s"}
+    bristles = {"bristle_stiffness": "8000 N*m/rad", "bristle_damping": "1 N*m*s/rad", "viscous": "0 N*m*s/rad"}
+    zero = {"ki": "0 N*m/(rad*s)", "kd": "0 N*m*s/rad", "tau": "20 ms"}
+    stage = BOOK["small joint"].replace(
+        {
+            "friction": {**friction, **bristles},
+            "controller": {"kind": "pid", "kp": f"{gain} N*m/rad", **zero},
+            "drive": {"sample_time": f"{sample} s"},
+            "motion.duration": "20 s",
+        }
+    )
+    largest = 8 * coulomb / (np.pi * gain * sample * np.sqrt(gain / mass))
+    assert judged(stage.replace({"motion.size": f"{0.95 * largest} rad"})).verdict == "settles"
+    assert judged(stage.replace({"motion.size": f"{1.08 * largest} rad"})).verdict in ("hunts", "failed")
