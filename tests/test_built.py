@@ -127,7 +127,12 @@ def test_friction_holds_a_sampled_loop_up_to_a_displacement() -> None:
     """
     gain, sample, mass, coulomb = 5.0, 0.02, 0.02, 0.05
     friction = {"model": "lugre", "static": "0.05 N*m", "coulomb": f"{coulomb} N*m", "stribeck_velocity": "0.05 rad/s"}
-    bristles = {"bristle_stiffness": "8000 N*m/rad", "bristle_damping": "1 N*m*s/rad", "viscous": "0 N*m*s/rad"}
+    bristles = {
+        "bristle_stiffness": "8000 N*m/rad",
+        "bristle_damping": "1 N*m*s/rad",
+        "viscous": "0 N*m*s/rad",
+        "stribeck_exponent": 2,
+    }
     zero = {"ki": "0 N*m/(rad*s)", "kd": "0 N*m*s/rad", "tau": "20 ms"}
     stage = BOOK["small joint"].replace(
         {
