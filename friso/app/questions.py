@@ -351,6 +351,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
     finest = COARSE_TO_FINE[-1]
     whole_options = {**ranges(finest), **shown}
+    edged = None
     if not KEPT.holds(friso.sweep, home, whole_options):
         look = KEPT.answer(sketched, home, work, {**ranges(COARSE_TO_FINE[0]), **shown})
         steps = [{**ranges(count), **shown, "at_edges": True} for count in COARSE_TO_FINE[1:]]
@@ -364,7 +365,8 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
             yield {**part(look.answer, count, title=title), "kind": "partly", "sentences": [], "details": []}
             if options.get("coarse") and step == steps[0]:
                 return
-    answer = KEPT.answer(friso.sweep, home, work, whole_options, lambda: located(look.answer, work.progress))
+        edged = partial(located, look.answer, work.progress)
+    answer = KEPT.answer(friso.sweep, home, work, whole_options, edged)
     whole = part(answer, finest)
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
