@@ -214,6 +214,20 @@ def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: D
     assert dashes[0][1:] == pytest.approx((1e-3, 1.45e-3))
 
 
+def test_labels_of_points_have_a_third_of_the_axis_each(round_a_fold: Diagram) -> None:
+    """Points that are closer share one, and none is cut at the sides: so wide are they on a page of 400 px."""
+    (panel, *_) = boundary_figure(round_a_fold, (MM,), "Rig").panels
+    (label,) = panel.words
+    assert [line.split()[0] for line in label.text.splitlines()] == ["flip", "flip", "fold"]
+    begun = replace(round_a_fold, special=((located("fold", 0.02, 1), *round_a_fold.special[0]),))
+    (panel, *_) = boundary_figure(begun, (MM,), "Rig").panels
+    low, high = panel.x.limits
+    shares = [(one.x - low) / (high - low) for one in panel.words]
+    assert len(shares) == 2
+    assert shares[0] == pytest.approx(1 / 6)
+    assert shares[1] - shares[0] > 1 / 3
+
+
 @pytest.fixture
 def crossing() -> Plane:
     """Three by three nodes: hunting ends at 1.25 mm, and at 1.3 mm at the high gain; one corner is invalid."""

@@ -205,6 +205,20 @@ def test_one_message_holds_the_command_that_tells_all(
     assert [file.name for file in tmp_path.iterdir()] == ["bare.csv"]
 
 
+def test_an_interrupted_analysis_leaves_the_values_that_it_has(
+    folder: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the inverse model, and no stage, which would have them as if they were examined."""
+    monkeypatch.setattr(friso.identification.moves, "fit_identifiable", _stopped)
+    run = friso_inside(folder, "identify", *WITH_STAGE, "--predict", "log.csv", "--check", "--out", "out", "--json")
+    told = json.loads(run.stdout)
+    assert (run.returncode, told["interrupted"], told["stage"], told["predictions"]) == (130, True, None, [])
+    mass = next(one for one in told["estimates"] if one["key"] == "mass")
+    truth = sum(machine.flat.get(key, 0.0) for key in ("masses.cart", "masses.stage"))
+    assert mass["low"] < truth < mass["high"]
+    assert {path.suffix for path in (folder / "out").iterdir()} == {".html", ".png", ".svg", ".pdf"}
+
+
 def test_a_kind_that_shows_nothing_is_not_kept(tmp_path: Path) -> None:
     """A body that hardly moves, said to go at constant speeds: the next run asks its kind anew."""
     time = np.arange(3000) * 1e-3

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from friso.stage.rig import AS_BUILT
 from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.edges import fine_edges
 from friso.studies.study import Study
-from friso.studies.sweep import local_crew, run_in_memory
+from friso.studies.sweep import dataset, local_crew, run_in_memory, run_scattered
 
 
 def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str) -> list[Study]:
@@ -52,8 +52,15 @@ def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str) -
         return [study_for(chosen, Varied({**axes}), metric, None, crew) for axes in all_axes]
 
 
-def sketched(stage: Stage, *, metric: str, progress: Progress = silent, **axes: str) -> SweepAnswer:
-    """Return a map over two keys whose edges lie half-way between cells, which is soon there.
+class Look(NamedTuple):
+    """A map whose edges lie half-way between cells, and which cells are computed, (n, n); others are as the nearest."""
+
+    answer: SweepAnswer
+    done: np.ndarray
+
+
+def sketched(stage: Stage, *, metric: str, progress: Progress = silent, **axes: str) -> Look:
+    """Return a map over two keys that is soon there.
 
     Its parameters are those of `friso.sweep`. Raises InputError for an unusable range.
     """
@@ -64,7 +71,32 @@ def sketched(stage: Stage, *, metric: str, progress: Progress = silent, **axes: 
     mention_unstable_loop(study.stage)
     with local_crew() as crew:
         (runs,) = run_in_memory([study], crew, progress)
-    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, edges=None)
+    answer = SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, edges=None)
+    return Look(answer, np.ones(study.shape, bool))
+
+
+def finer(stage: Stage, coarse: Look, *, at_edges: bool, metric: str, **axes: str) -> Look:
+    """Return a map over the same ranges with more points, those of the `coarse` one and others between them.
+
+    With `at_edges`, cells are computed between those of the coarse map of which some hunt and some do not (of another
+    metric than verdicts: that differ), else all that are left.
+    """
+    (study,) = _studies(stage, [Varied.of_texts({}, axes["x"], axes["y"], ()).axes], metric)
+    ratio, along = (study.shape[0] - 1) // (len(coarse.done) - 1), np.arange(study.shape[0])
+    known, (below, above) = coarse.answer.result, (along // ratio, -(-along // ratio))
+    told = np.isin(known[metric], ATTRACTED) if metric in ("sketch", "verdict") else known[metric].values
+    corners = [told[np.ix_(one, other)] for one in (below, above) for other in (below, above)]
+    wanted = np.logical_or.reduce([corners[0] != corner for corner in corners]) | (not at_edges)
+    done = np.zeros(study.shape, bool)
+    done[::ratio, ::ratio] = coarse.done
+    cells, nearest = np.flatnonzero(wanted & ~done), np.rint(along / ratio).astype(int)
+    columns = {name: known[name].values[np.ix_(nearest, nearest)] for name in study.metrics}
+    with local_crew() as crew:
+        for name, values in run_scattered(study, cells, crew).items() if cells.size else ():
+            columns[name].flat[cells] = values
+    runs = dataset(study, columns)
+    answer = SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, edges=None)
+    return Look(answer, done | wanted)
 
 
 def located(sketch: SweepAnswer, progress: Progress) -> SweepAnswer:

@@ -16,6 +16,7 @@ from friso.app import machine as machines
 from friso.app.machine import Machine, Uploads, archive, command_line, python_line
 from friso.app.maps import (
     cures_of,
+    finer,
     ghosts_of,
     home_of,
     located,
@@ -308,7 +309,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
 }
 """The options that a page may set, by command."""
 
-COARSE_TO_FINE = (6, 21)
+COARSE_TO_FINE = (6, 11, 21)
 """Numbers of points along each axis of a map, in the order of its pictures. The last one has its edges located."""
 
 
@@ -316,7 +317,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield a map over two keys from coarse to fine, with marks where the machines lie in it.
 
     If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead. With the option
-    `coarse` the first picture is all, unless the map is there: a page asks for more once its verdict is known.
+    `coarse` the first two pictures are all, unless the map is there: a page asks for more once its verdict is known.
     """
     options = asked.chosen(*OPTIONS["map"])
     axes, spacing = {name: str(options.get(name, "")) for name in ("x", "y")}, _spacing(options)
@@ -330,10 +331,6 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     def ranges(count: int) -> dict[str, Any]:
         """Return the ranges of both axes with `count` points."""
         return {name: f"{text}:{count}{spacing}" for name, text in axes.items()}
-
-    def cells(count: int) -> SweepAnswer:
-        """Return the map with `count` points along each axis, without located edges."""
-        return KEPT.answer(sketched, home, work, {**ranges(count), **shown})
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None, title: str = "") -> AnswerPart:
         """Return a map as the page shows it, with the machines and the edge of hunting on it.
@@ -354,13 +351,22 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
     finest = COARSE_TO_FINE[-1]
     whole_options = {**ranges(finest), **shown}
+    edged = None
     if not KEPT.holds(friso.sweep, home, whole_options):
-        for count in COARSE_TO_FINE:
-            title = f"A first look: {count} by {count} cells, whose edges are not located yet"
-            yield {**part(cells(count), count, title=title), "kind": "partly", "sentences": [], "details": []}
-            if options.get("coarse"):
+        look = KEPT.answer(sketched, home, work, {**ranges(COARSE_TO_FINE[0]), **shown})
+        steps = [{**ranges(count), **shown, "at_edges": True} for count in COARSE_TO_FINE[1:]]
+        for step in [{}, *steps, {**steps[-1], "at_edges": False}]:
+            if step:
+                look = KEPT.answer(finer, home, work, step, partial(finer, home.stage, look, **step))
+            elif KEPT.holds(finer, home, steps[0]):
+                continue
+            count = len(look.done)
+            title = f"A first look: {count} by {count} cells{' at its edges' * (not look.done.all())}, not located yet"
+            yield {**part(look.answer, count, title=title), "kind": "partly", "sentences": [], "details": []}
+            if options.get("coarse") and step == steps[0]:
                 return
-    answer = KEPT.answer(friso.sweep, home, work, whole_options, lambda: located(cells(finest), work.progress))
+        edged = partial(located, look.answer, work.progress)
+    answer = KEPT.answer(friso.sweep, home, work, whole_options, edged)
     whole = part(answer, finest)
     if options.get("edge"):
         yield {**whole, "kind": "partly"}

@@ -279,11 +279,11 @@ class KeptAnswers:
 
     def answer(
         self,
-        function: Callable[..., Answer],
+        function: Callable[..., Any],
         machine: Machine,
         work: Work,
         options: Mapping[str, Any] | None = None,
-        compute: Callable[[], Answer] | None = None,
+        compute: Callable[[], Any] | None = None,
     ) -> Any:
         """Return a function's answer about a machine, computed now or kept from before.
 
@@ -306,9 +306,7 @@ class KeptAnswers:
                 kept.popitem(last=False)
         return answer
 
-    def holds(
-        self, function: Callable[..., Answer], machine: Machine, options: Mapping[str, Any] | None = None
-    ) -> bool:
+    def holds(self, function: Callable[..., Any], machine: Machine, options: Mapping[str, Any] | None = None) -> bool:
         """Tell whether a function's answer about a machine, with these `options`, is kept."""
         with self._turn:
             return _place(machine, options) in self._kept.get(function, ())

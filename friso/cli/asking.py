@@ -26,7 +26,7 @@ from friso.axis import speak_of
 from friso.cli.terminal import ProgressBar, print_document, print_table, print_wrapped, print_written, say
 from friso.errors import InputError
 from friso.platform import files
-from friso.platform.interrupts import answers_interrupts, whole_answer
+from friso.platform.interrupts import whole_answer
 from friso.platform.system import cause_of, path_of, shell_word
 from friso.progress import Progress
 
@@ -150,8 +150,6 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     `options` are the command's options by name, and `kept` are further keywords of the function. Raises InputError for
     wrong input. Raises typer.Exit with the status of a failure.
     """
-    if question.answers_interrupted:
-        answers_interrupts()
     target = None
     if shown.out is not None:
         from friso.interface.output_folder import OutputFolder

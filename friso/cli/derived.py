@@ -16,6 +16,7 @@ import typer
 
 from friso.cli.asking import Shown, ask, option_of
 from friso.interface.question import OF_THE_CALLER, Question, meaning
+from friso.platform.interrupts import answers_interrupts
 from friso.stage.arguments import KINDS, ArgumentKind, alternatives
 
 
@@ -55,6 +56,8 @@ def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
     about = [values[name] for name in question.takes]
     apart = {*question.takes, *Shown.__dataclass_fields__}
     options = {name: value for name, value in values.items() if value is not None and name not in apart}
+    if question.answers_interrupted:
+        answers_interrupts()
     run = resolve_name(question.runner) if question.runner else ask
     run(question, about, options, shown)
 

@@ -22,6 +22,7 @@ from friso.cli.asking import Shown, ask, named_as_options, show
 from friso.cli.terminal import ProgressBar, print_document, say
 from friso.errors import InputError, one_line
 from friso.interface.question import Question
+from friso.platform.interrupts import whole_answer
 from friso.platform.system import shell_word
 from friso.progress import Progress
 
@@ -79,7 +80,8 @@ def run_identify(question: Question, about: Sequence[Any], options: Mapping[str,
             example = _command(error.options) if error.options else ""
             raise InputError(error.key, error.actual, error.expected, example, error.origin) from None
     speak_of(answer.axis_kind)
-    show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
+    with whole_answer():
+        show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
 
 
 def _keep(mappings: dict[Path, LogMapping], target: OutputFolder) -> list[Path]:

@@ -44,7 +44,8 @@ class Identification:
     are for the engineer.
 
     `doubts` are sentences against trusting the result, and `failed` tells whether an analysis failed, even if parts of
-    it hold. `origins` has the origin of each key of the stage.
+    it hold. `origins` has the origin of each key of the stage. `interrupted` tells whether Ctrl-C ended the analysis:
+    of logs that were not analysed to the end, there are the first estimates alone, and none of these in the stage.
     """
 
     stage: Stage | None
@@ -55,6 +56,7 @@ class Identification:
     doubts: tuple[str, ...] = ()
     failed: bool = False
     origins: Mapping[str, str] = field(default_factory=dict)
+    interrupted: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,8 @@ def identify(
     """Identify the stage from logs, each with its kind of experiment.
 
     `base` is the prior stage; `made_up` lists its keys with assumed values. If the base has the machine's own
-    controller, moves with a reference are simulated in closed loop. Raises InputError for logs that cannot be used.
+    controller, moves with a reference are simulated in closed loop. Raises InputError for logs that cannot be used, and
+    KeyboardInterrupt at Ctrl-C, if there is no estimate yet.
     """
     if base is not None and base.conditions is not None:
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
@@ -85,19 +88,37 @@ def identify(
     stage = base or around(logs)
     experiments: list[Experiment] = []
     pieces = iter(together(progress, sum(map(len, kinds.values()))))
-    for kind, groups in kinds.items():
-        best = combined(_every_estimate(experiments))[0]
-        shown = {estimate.name: estimate for estimate in best if estimate.determined}
-        analysed = partial(_analysed, kind, Prior(stage, base is not None, shown, made_up), settings)
-        results = side_by_side([partial(analysed, group, next(pieces)) for group in groups])
-        estimates = (KINDS[kind].estimates(result, stage) for result in results)
-        experiments += map(Experiment, repeat(kind), groups, results, estimates)
+    told: dict[str, Sequence[Estimate]] = {}
+
+    def tell(name: str, estimates: Sequence[Estimate]) -> None:
+        told[name] = estimates
+        settings.tell(name, estimates)
+
+    first: list[Estimate] = []
+    cut: tuple[str, ...] = ()
+    try:
+        for kind, groups in kinds.items():
+            best = combined(_every_estimate(experiments))[0]
+            shown = {estimate.name: estimate for estimate in best if estimate.determined}
+            prior = Prior(stage, base is not None, shown, made_up)
+            analysed = partial(_analysed, kind, prior, replace(settings, tell=tell))
+            results = side_by_side([partial(analysed, group, next(pieces)) for group in groups])
+            estimates = (KINDS[kind].estimates(result, stage) for result in results)
+            experiments += map(Experiment, repeat(kind), groups, results, estimates)
+    except KeyboardInterrupt:
+        if not experiments and not told:
+            raise
+        done = {log.name for one in experiments for log in one.logs}
+        left = [log.name for log, _ in logs if log.name not in done]
+        cut = (f"Interrupted: {', '.join(left)} not analysed to the end; values of the inverse model are not examined",)
+        first = combined([one for name in left for one in told.get(name, ()) if one.name != "offset"])[0]
     estimates, warnings = combined(_every_estimate(experiments))
-    doubts = _doubts(experiments)
+    doubts = (*cut, *_doubts(experiments))
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
-    if stage is None or nothing_learnt(estimates, failed) or (base is None and not _shows_a_mass(estimates)):
-        shown = (tuple(experiments), tuple(estimates), tuple(warnings))
-        return Identification(None, Correlations(), *shown, doubts, failed)
+    useless = (cut and not experiments) or nothing_learnt(estimates, failed)
+    if stage is None or useless or (base is None and not _shows_a_mass(estimates)):
+        shown = (tuple(experiments), (*estimates, *first), tuple(warnings))
+        return Identification(None, Correlations(), *shown, doubts, failed, interrupted=bool(cut))
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
@@ -106,9 +127,9 @@ def identify(
     contradicted = {table for one in experiments for table in KINDS[one.kind].contradicted(one.result)}
     fitted = with_unknown(fitted, sources, (*fits.left, *contradicted), estimates)
     unknown = _unknown(fitted)
-    shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
+    shown = (tuple(experiments), (*estimates, *first), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)
-    return Identification(fitted, correlated, *shown, doubts, failed, sources)
+    return Identification(fitted, correlated, *shown, doubts, failed, sources, bool(cut))
 
 
 def _unknown(stage: Stage) -> list[str]:

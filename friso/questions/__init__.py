@@ -90,6 +90,7 @@ TABLE = {
             folder="identified",
             details=True,
             choices=Choices.of_registry("Kinds of experiment (--as)", "friso.identification.kinds:KINDS"),
+            answers_interrupted=True,
             runner="friso.cli.runs:run_identify",
         ),
         Question(

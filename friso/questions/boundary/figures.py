@@ -50,6 +50,9 @@ LARGEST_MULTIPLIER = 2.5
 LOGARITHMIC_RATIO = 30.0
 """Ratio of the largest to the smallest amplitude above which the axis is logarithmic."""
 
+LABEL_WIDTH = 1 / 3
+"""Width of a label of a point on a page of 400 px, as a fraction of the axis. Closer ones are one label."""
+
 PLANE_MARGIN = 0.02
 """Margin around the plane of two keys, as a fraction of the range, so that nodes at its sides are fully visible."""
 
@@ -121,18 +124,24 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
             style = ("solid", 2.0) if attracts else ("dashed", 1.4)
             series.append(Series(line.at[run, 0], getattr(line, measure)[run], text, COLOURS[line.shape], *style))
     turns = sorted(((line, k) for line in branches for k in line.special), key=lambda turn: turn[0].at[turn[1], 0])
-    markers, words = [], list[Lettering]()
-    low, high = x.limits or (0.0, 0.0)
+    markers, words, shares = [], list[Lettering](), list[float]()
+    scale = np.log if x.log else np.asarray
+    low, high = scale(x.limits or (0.0, 1.0))
     for line, k in turns:
         at, value = float(line.at[k, 0]), float(getattr(line, measure)[k])
         markers.append(Markers(np.array([at]), np.array([value]), "", COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
         if not key:
             continue
         text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}"
-        if words and at - words[-1].x < PLANE_MARGIN * (high - low):
-            words[-1] = replace(words[-1], text=f"{words[-1].text}\n{text}")
+        share = float(np.clip((scale(at) - low) / (high - low), LABEL_WIDTH / 2, 1 - LABEL_WIDTH / 2))
+        if words and share - shares[-1] < LABEL_WIDTH:
+            colour = words[-1].colour if words[-1].colour == COLOURS[line.shape] else INK
+            text, above = f"{words[-1].text}\n{text}", max(words[-1].y, value)
+            words[-1] = replace(words[-1], y=above, text=text, colour=colour)
         else:
-            words.append(Lettering(at, value, text, COLOURS[line.shape], "below" if len(words) % 2 else "above"))
+            shares.append(share)
+            beside = float(low + share * (high - low))
+            words.append(Lettering(np.exp(beside) if x.log else beside, value, text, COLOURS[line.shape], "above"))
     return Panel("", x, y, tuple(series), tuple(markers), words=tuple(words))
 
 

@@ -82,6 +82,11 @@ class IdentifyAnswer(Answer):
         return "a model does not describe its log" if self.result.failed else ""
 
     @property
+    def interrupted(self) -> bool:
+        """Tell whether Ctrl-C ended the analysis, so that logs are left out."""
+        return self.result.interrupted
+
+    @property
     def subject(self) -> IdentifyAnswer:
         """Return the answer itself, which has the logs and the predictions."""
         return self
@@ -202,11 +207,18 @@ def identify(
     reused = [file.reused for file in held if file.reused]
     left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
-    predictions = [predicted(result, log, settings, assumed) for log in others]
-    if keep is not None and not merge and not result.failed and not nothing_learnt(result.estimates, False):
+    rest = others if not result.interrupted else []
+    predictions = [predicted(result, log, settings, assumed) for log in rest]
+    if (
+        keep is not None
+        and not merge
+        and not result.interrupted
+        and not result.failed
+        and not nothing_learnt(result.estimates, False)
+    ):
         keep({file.path: _worth_keeping(file, result) for file in held})
     checked = None
-    if check and result.stage is not None:
+    if check and result.stage is not None and not result.interrupted:
         from friso.questions.check.question import checked_stage
 
         checked = checked_stage(result.stage, result.correlations, progress=progress)

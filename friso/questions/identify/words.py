@@ -108,10 +108,11 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
     doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
     first = identification.failed and not (effects and len(identification.experiments) > 1)
+    first, begun = first or identification.interrupted, identification.interrupted and not identification.experiments
     lines = doubts if first else []
     if effects:
         values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in effects)
-        lines.append((GREEN, f"Identified: {values}."))
+        lines.append((GREEN, f"{'At first' if begun else 'Identified'}: {values}."))
     elif bounded:
         bounds = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in bounded)
         lines.append((ORANGE, f"Known to lie in an interval too wide for a value: {bounds}."))
@@ -134,6 +135,8 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
 
 def _why_no_stage(identification: Identification) -> str:
     """Say why no stage file is written."""
+    if identification.interrupted:
+        return "No stage file is written: the analysis was interrupted."
     if identification.failed or nothing_learnt(identification.estimates, False):
         return NOTHING_HOLDS
     shown = axis_shown()
@@ -506,7 +509,7 @@ def identify_document(
             {"log": prediction.log.name, **KINDS[prediction.kind].prediction_numbers(prediction.result)}
             for prediction in predictions
         ],
-        "failed": identification.failed,
+        **entries(identification, "failed", "interrupted"),
         "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
         "warnings": [axis_shown().text(warning) for warning in identification.warnings],
     }
