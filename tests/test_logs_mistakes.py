@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from log_files import motion, write_text
 from refusals import refused
 
 import friso
 from friso.errors import LogError
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import repeated_stamps
+from friso.identification.logs.read import read_table
 from friso.identification.logs.roles import from_options
 
 M = log_files.motion()
@@ -80,3 +82,70 @@ def test_comments_in_lvm_are_no_numbers(tmp_path: Path) -> None:
     lines[-50] += "\tset the gain to 1_0"
     path.write_text("\n".join(lines) + "\n")
     assert read_log(path)["position"].size == len(M["time"])
+
+
+def moved(**changes: np.ndarray) -> list[np.ndarray]:
+    """Columns of a motion, in s, mm and N, some of them changed."""
+    columns = motion(4000)
+    columns["position"] = 1e3 * columns["position"]
+    return [{**columns, **changes}[name] for name in ("time", "position", "force")]
+
+
+HEADING = ["time (s)", "position (mm)", "force (N)"]
+
+
+def placed(values: np.ndarray, number: float, *places: slice) -> np.ndarray:
+    changed = values.copy()
+    for place in places:
+        changed[place] = number
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("role", "number", "places", "lost"),
+    [
+        ("force", -9999.0, [slice(100, 110), slice(2000, 2003)], 13),
+        ("position", -999.25, [slice(900, 901)], 1),
+        ("position", 0.0, [slice(1462, 1467)], 5),
+        ("force", 150.0, [slice(100, 110)], 0),
+        ("position", -99.0, [slice(0, 3900)], 0),
+    ],
+    ids=["a sentinel", "a single one", "a dropout to 0", "a round number within", "hardly anything else"],
+)
+def test_numbers_that_stand_for_no_value_count_as_lost(
+    tmp_path: Path, role: str, number: float, places: list[slice], lost: int
+) -> None:
+    columns = motion(4000)
+    scale = 1e3 if role == "position" else 1.0
+    file = write_text(tmp_path / "log.csv", HEADING, moved(**{role: placed(scale * columns[role], number, *places)}))
+    table = read_table(file)
+    (channel,) = (one for one in table.channels if one.name == role)
+    assert np.count_nonzero(np.isnan(channel.values)) == lost
+    assert len(table.warnings) == (lost > 0)
+
+
+def test_a_row_of_units_that_contradicts_a_heading_asks(tmp_path: Path) -> None:
+    """Either may be wrong by a factor of a thousand."""
+    file = write_text(tmp_path / "log.csv", HEADING, moved(), units=["s", "m", "N"])
+    with pytest.raises(LogError, match=re.escape("--unit")):
+        read_log(file)
+    read = read_log(file, from_options(units=["position (mm)=mm"]))
+    assert np.ptp(read.signals["position"]) == pytest.approx(np.ptp(motion(4000)["position"]))
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit", "size"),
+    [("force (10 mN)", "", 1e-2), ("force", "2.5e-3 N", 2.5e-3), ("force (25 Hz)", "N", 1.0), ("ActTrq", "N", 1.0)],
+)
+def test_a_unit_may_have_a_number(tmp_path: Path, heading: str, unit: str, size: float) -> None:
+    file = write_text(tmp_path / "log.csv", [*HEADING[:2], heading], moved())
+    read = read_log(file, from_options(units=[f"{heading}={unit}"] if unit else []))
+    assert np.ptp(read.signals["force"]) == pytest.approx(size * np.ptp(motion(4000)["force"]))
+
+
+def test_infinity_as_a_sign_is_no_value(tmp_path: Path) -> None:
+    file = write_text(tmp_path / "log.csv", HEADING, moved())
+    lines = file.read_text(encoding="utf-8").splitlines()
+    lines[77] = ",".join([*lines[77].split(",")[:2], "-∞"])
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert "1 of 4000 samples lost" in " ".join(read_log(file).warnings)

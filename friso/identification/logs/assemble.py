@@ -60,7 +60,7 @@ def read_log(
     check_gaps(reading, proposal, needed, readings)
     chosen = proposal.chosen
     unused(mapping, chosen, str(path))
-    notes, even = Notes(list(table.read), _undecided(proposal)), None
+    notes, even = Notes([*table.read], [*_undecided(proposal), *table.warnings]), None
     try:
         signals = _stamped(chosen, reading, notes, needed) if stamped else {}
         uneven = bool(signals)

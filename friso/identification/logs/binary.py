@@ -289,7 +289,8 @@ def frame_columns(path: Path) -> dict[str, Any]:
 
     with path.open("rb") as file:
         frame = pd.read_parquet(path) if file.read(4) == b"PAR1" else pd.read_feather(path)
-    return _content({str(name): frame[name] for name in frame.columns})
+    named = frame.reset_index() if frame.index.name else frame
+    return _content({str(name): named[name] for name in named.columns})
 
 
 def _content(columns: dict[str, Any]) -> dict[str, Any]:

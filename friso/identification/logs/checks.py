@@ -5,6 +5,7 @@ A delay is reported with its interval, never applied.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -115,6 +116,57 @@ def clipped_share(values: np.ndarray) -> float:
         if any(top.start > 0 and top.stop < values.size for top in flat):
             count += sum(top.stop - top.start for top in flat)
     return count / values.size
+
+
+SAMPLES_OF_A_SIGNAL = 100
+"""Fewest samples of which one can say that some are none."""
+
+SHARE_OF_ABSENT_VALUES = 0.2
+"""Largest fraction of a signal that may stand for no value. With more, it is a signal."""
+
+GAP_OF_ABSENT_VALUES = 3.0
+"""Least distance of a number that stands for no value from all others, over their range."""
+
+_STANDS_FOR_NONE = re.compile(r"-?9{2,}(\.0|\.25|\.9+)?")
+"""Numbers that instruments write where they have no value: -9999, -999.25."""
+
+
+def absent(values: np.ndarray) -> float | None:
+    """Return the number in a signal that stands for no value, such as -9999; None without one."""
+    finite = values[np.isfinite(values)]
+    if finite.size < SAMPLES_OF_A_SIGNAL:
+        return None
+    for number in {float(finite.min()), float(finite.max())}:
+        others = finite[finite != number]
+        few = 0 < finite.size - others.size <= SHARE_OF_ABSENT_VALUES * finite.size
+        far = few and np.abs(others - number).min() > GAP_OF_ABSENT_VALUES * np.ptp(others)
+        if far and _STANDS_FOR_NONE.fullmatch(repr(number)):
+            return number
+    return None
+
+
+LONGEST_DROPOUT, SHARE_OF_DROPOUTS = 50, 0.01
+"""Most samples of a dropout, and the largest fraction of a signal in dropouts."""
+
+STEP_OF_A_DROPOUT = 10.0
+"""Least step into a dropout and out of it, over the largest of 99 % of all steps."""
+
+
+def dropouts(values: np.ndarray) -> np.ndarray:
+    """Return which values of a signal, (n,), are dropouts: short zeros between alike values far from zero."""
+    lost = np.zeros(values.size, bool)
+    steps = np.abs(np.diff(values))
+    if values.size < SAMPLES_OF_A_SIGNAL or not np.isfinite(steps).any():
+        return lost
+    usual = float(np.nanquantile(steps, 0.99))
+    for zeros in runs(values == 0.0):
+        before, after = zeros.start - 1, zeros.stop
+        if before < 0 or after >= values.size or zeros.stop - zeros.start > LONGEST_DROPOUT:
+            continue
+        low, high = sorted(np.abs(values[[before, after]]))
+        alike = values[before] * values[after] > 0 and high - low <= 0.5 * low
+        lost[zeros] = alike and low > STEP_OF_A_DROPOUT * usual
+    return lost if lost.mean() <= SHARE_OF_DROPOUTS else np.zeros(values.size, bool)
 
 
 NUMBER_OF_LARGE_STEPS = 20

@@ -42,13 +42,14 @@ class ChannelTable:
 
     `scalars` are single numbers of the file by name, and `read` has lines on how the file was read (format, delimiter,
     decimal sign, rows left out and why). `interval` is the sampling interval [s] that the file states above its
-    columns, or None.
+    columns, or None. `warnings` say which of its values are none.
     """
 
     channels: tuple[Channel, ...]
     scalars: Mapping[str, float] = field(default_factory=dict)
     read: tuple[str, ...] = ()
     interval: float | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make the names unique, and escape the texts."""
@@ -56,7 +57,8 @@ class ChannelTable:
         channels = tuple(replace(c, name=name) for c, name in zip(self.channels, names, strict=True))
         object.__setattr__(self, "channels", channels)
         object.__setattr__(self, "scalars", {one_line(name): value for name, value in self.scalars.items()})
-        object.__setattr__(self, "read", tuple(map(one_line, self.read)))
+        for name in ("read", "warnings"):
+            object.__setattr__(self, name, tuple(map(one_line, getattr(self, name))))
 
 
 def unique(names: Sequence[str]) -> list[str]:

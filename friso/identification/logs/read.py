@@ -35,10 +35,14 @@ from threading import Timer
 from typing import IO, Any
 from weakref import finalize
 
+import numpy as np
+
 from friso.errors import InputError, LogError
 from friso.identification.logs import binary
+from friso.identification.logs.checks import absent, dropouts
 from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.logs.roles import role_of
 from friso.identification.logs.settings import settings
 from friso.identification.logs.sniff import decoded_head
 from friso.platform.installed import install, is_installed
@@ -474,7 +478,7 @@ def read_file(path: Path | str) -> ReadFile:
     """
     with _plain(path) as plain:
         form = FORMATS[_plain_format(plain)]
-        return ReadFile(Path(path), form, form.read(plain))
+        return ReadFile(Path(path), form, _without_absent(form.read(plain)))
 
 
 def glance(path: Path) -> ReadFile:
@@ -487,10 +491,27 @@ def glance(path: Path) -> ReadFile:
         form = FORMATS[_plain_format(plain)]
         if form.of_lines and (sample := sample_of(plain)) is not None:
             with suppress(LogError):
-                table = form.read(sample.file.path)
+                table = _without_absent(form.read(sample.file.path))
                 rows = max(channel.values.size for channel in table.channels)
                 return ReadFile(path, form, table, sample.growth, rows - sample.later)
-        return ReadFile(path, form, form.read(plain))
+        return ReadFile(path, form, _without_absent(form.read(plain)))
+
+
+def _without_absent(table: ChannelTable) -> ChannelTable:
+    """Return a table without numbers that stand for no value, and without dropouts to 0, which count as lost."""
+    channels, notes = list[Channel](), list[str]()
+    for channel in table.channels:
+        values = channel.values
+        if (role_of(channel.name, channel.unit) or ("",))[0] != "time":
+            found = {"of 0 between others": dropouts(values)}
+            if (number := absent(values)) is not None:
+                found[f"of {number:.10g}"] = values == number
+            for what, lost in found.items():
+                if lost.any():
+                    values = np.where(lost, np.nan, values)
+                    notes.append(f"{channel.name}: {np.count_nonzero(lost)} samples {what} count as lost")
+        channels.append(replace(channel, values=values))
+    return replace(table, channels=tuple(channels), warnings=(*table.warnings, *notes)) if notes else table
 
 
 def is_frequency_response(path: Path | str) -> bool:

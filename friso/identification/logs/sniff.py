@@ -64,7 +64,7 @@ def _pattern(decimal: str, groupings: str) -> str:
     plain, point = NUMBER.replace(r"\.", re.escape(decimal)), re.escape(decimal)
     name = "a" if decimal == "." else "b"  # both patterns may be parts of one
     grouped = rf"[1-9]\d{{0,2}}(?P<{name}>[{groupings}])\d{{3}}(?:(?P={name})\d{{3}})*(?:{point}\d*)?|"
-    return rf"[+-]?(?:{grouped if groupings else ''}{plain}|nan|inf(?:inity)?)|true|false"
+    return rf"[+-]?(?:{grouped if groupings else ''}{plain}|nan|inf(?:inity)?|∞)|true|false"
 
 
 _PATTERNS = {form: _pattern(*form) for sign in DECIMAL_SIGNS for form in (NumberFormat(sign), *formats_with(sign))}
@@ -146,8 +146,8 @@ def _values(texts: Any, form: NumberFormat) -> np.ndarray:
     """Return the values of texts that are numbers in a format."""
     texts = texts.str.replace(form.grouping, "", regex=False) if form.grouping else texts
     texts = texts.str.replace(form.decimal, ".", regex=False)
-    for name, value in (("true", "1"), ("false", "0")):
-        if texts.isin([name, name.title(), name.upper()]).any():
+    for name, value in (("true", "1"), ("false", "0"), ("[+-]?∞", "inf")):
+        if texts.str.fullmatch(name, case=False).any():
             texts = texts.str.replace(f"^{name}$", value, case=False, regex=True)
     return as_numbers(texts.str.replace(r"(?<=[\d.])[dD]", "e", regex=True))
 

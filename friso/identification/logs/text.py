@@ -43,7 +43,7 @@ from friso.identification.logs.sniff import (
     number_texts,
     split_line,
 )
-from friso.identification.logs.units import channel_words, is_unit, split_heading, unit_factor, unit_since_1970
+from friso.identification.logs.units import channel_words, is_unit, spelled, split_heading, unit_factor, unit_since_1970
 from friso.quantities import quoted
 
 
@@ -403,7 +403,7 @@ def read_text(path: Path) -> ChannelTable:
     names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
     heading = preamble(form.above, names, form.delimiter, form.numbers.decimal)
     stated = form.units or [""] * len(names)
-    units = [unit or heading.units.get(name, "") for unit, name in zip(stated, names, strict=True)]
+    units = [_agreed(name, unit or heading.units.get(name, "")) for unit, name in zip(stated, names, strict=True)]
     notes, columns = list(heading.read), []
     _no_short_rows(path, form, frame)
     blank = frame.isna().all(axis=1).to_numpy()
@@ -423,6 +423,12 @@ def read_text(path: Path) -> ChannelTable:
     channels = with_times(_same_ends(path, form, columns, frame), heading.interval)
     read = (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes)
     return ChannelTable(channels, heading.scalars, read, heading.interval)
+
+
+def _agreed(name: str, unit: str) -> str:
+    """Return the unit of a column from a row of units; "" if the column's name has another one."""
+    own = spelled(split_heading(name)[1])
+    return "" if own and unit and own != spelled(unit) else unit
 
 
 def _such_as(cells: Any) -> str:

@@ -82,6 +82,10 @@ _OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\(
 """Headings in the style of ISO 80000, a quantity over its unit, also in words."""
 _QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\s*/\s*(?P<under>[^\s_/\[(\])]+)")
 """Headings that end, or may end, with a quotient of units: "Speed m/s"."""
+_MULTIPLE = re.compile(r"(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?) +(?P<unit>[^\d\s].*)")
+"""A multiple of a unit, "10 mN"."""
+POWERS_OF_TEN = frozenset(float(f"1e{power}") for power in range(-9, 10))
+"""Numbers before a unit in a heading. Others say something else."""
 _DECIBELS = re.compile(r"dB(?![A-Za-z])(?:\s*(?:rel?\b\.?|ref\b\.?))?\s*[(\[]?([^()\[\]]*)[)\]]?", re.IGNORECASE)
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with an unambiguous unit; pos_in and pos_min have no unit."""
@@ -132,7 +136,13 @@ def _below(part: str, before: str) -> str:
 
 @lru_cache(maxsize=1024)
 def unit_factor(unit: str, si_unit: str) -> float | None:
-    """Return the SI value of 1 `unit`, or None if it is not of the kind of `si_unit`."""
+    """Return the SI value of 1 `unit`, or None if it is not of the kind of `si_unit`.
+
+    A unit may have a number, "10 mN".
+    """
+    if multiple := _MULTIPLE.fullmatch(unit):
+        factor = unit_factor(multiple["unit"], si_unit)
+        return None if factor is None else float(multiple["number"]) * factor
     try:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
@@ -142,7 +152,7 @@ def unit_factor(unit: str, si_unit: str) -> float | None:
 
 def is_unit(text: str) -> bool:
     """Tell whether a text is a unit that a log could have."""
-    text = spelled(text)
+    text = spelled(text) if _MULTIPLE.fullmatch(text) is None else text
     is_special = text.lower() in COUNTS or text == "%" or of_decibels(text) is not None
     return is_special or any(unit_factor(text, unit) is not None for unit in _KINDS)
 
@@ -179,6 +189,9 @@ def split_heading(heading: str) -> tuple[str, str]:
     name, bracket, inner = heading.removesuffix(closing).rpartition(opening)
     if not (heading.endswith(closing) and bracket and name.strip()) or closing in inner:
         return heading, _last_part(heading)
+    multiple = _MULTIPLE.fullmatch(inner)
+    if multiple and float(multiple["number"]) not in POWERS_OF_TEN:
+        return heading, ""  # "(25 Hz)" says how it was filtered
     is_in = not re.fullmatch(r"[\d:, ]*", inner) if opening == "[" else is_unit(inner)
     return (name.rstrip(), inner.strip()) if is_in else (heading, "")
 
