@@ -584,8 +584,9 @@ def test_map(browsed: Browsed) -> None:
     browsed.change({"masses.stage": "0.52 kg"})
     check.come().continue_()
     page.click("#tab-map")
-    page.wait_for_function(f"() => {rows} === 21")  # a finer map under the pointer takes its run away
     check.end()
+    whole = "!document.querySelector('#picture h3').innerText.includes('first look')"
+    page.wait_for_function(f"() => {rows} === 21 && {whole}")  # a finer map under the pointer takes its run away
     point, place = (page.wait_for_selector(name).bounding_box() for name in (".handle", ".plot .nsewdrag"))
     middle = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
     page.evaluate("""() => {

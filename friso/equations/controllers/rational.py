@@ -174,13 +174,11 @@ class RationalController(ControllerSection):
     @classmethod
     def as_pid(cls, flat: Mapping[str, Any]) -> PidLike:
         """Return the gains at low frequencies."""
-        speed, first = flat[cls.key("speed")], {"a1": 0.0, "b1": 0.0}
-        for name in first:
-            places = (key for key in flat if key.startswith(cls.key(f"{PARTS}.")) and key.endswith(f".{name}"))
-            first[name] = sum(flat[key] for key in places) / speed
-        kp = flat[cls.key("gain")] * flat[cls.key(f"{PARTS}.stiffness")]
-        ki = flat[cls.key("gain")] * speed * flat.get(cls.key(f"{PARTS}.integral"), 0.0)
-        return PidLike(kp, ki, kp * max(first["b1"] - first["a1"], 0.0), first["a1"], moving_mass(flat))
+        gain, speed, parts = flat[cls.key("gain")], flat[cls.key("speed")], cls.key(f"{PARTS}.")
+        times = {key: value / speed for key, value in flat.items() if key.startswith(parts)}
+        lead, lag = (sum(times[key] for key in times if key.endswith(name)) for name in (".b1", ".a1"))
+        kp, ki = gain * flat[f"{parts}stiffness"], gain * speed * flat.get(f"{parts}integral", 0.0)
+        return PidLike(kp, ki, kp * max(lead - lag, 0.0), lag, moving_mass(flat))
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
