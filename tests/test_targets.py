@@ -482,7 +482,9 @@ def test_names_that_collide_are_named() -> None:
 
     def program(*names: str) -> Program:
         symbols = tuple(map(sp.Symbol, names))
-        return Program((), {}, (), symbols, (), symbols, (), symbols, sp.S.Zero, 1e-3)
+        given = dict.fromkeys(("inputs", "prepared", "begins", "steps"), ())
+        kept = dict.fromkeys(("memories", "started", "updates"), symbols)
+        return Program(**given, **kept, parameters={}, command=sp.S.Zero, period=1e-3)
 
     TARGETS["c"].check_names("axis", program("Rate", "rate"))
     for target, names in (("st", ("Rate", "rate")), ("c", ("a.b", "a_b")), ("st", ("mod",)), ("c", ("double",))):

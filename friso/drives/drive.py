@@ -333,10 +333,6 @@ SAMPLE_TIME, POSITION_TIME = "drive.sample_time", "drive.position_sample_time"
 
 FORMATS: Registry[DriveFormat] = Registry("friso.drives.formats", "")
 
-TOLD = ("machine_unit", "force_per_output", "length_per_unit", "velocity_per_output", "travel_per_turn")
-"""Keys of [drive] that hold the units of a drive. They are given to friso init --from or read from a file, and friso
-export needs them."""
-
 
 def axes_with(gain: str, settings: Iterable[tuple[str, str, Any]], otherwise: InputError) -> tuple[AxisParameters, ...]:
     """Return the axes that have a `gain` among their settings (axis, name and value), of which the last ones count.

@@ -14,11 +14,12 @@ from typing import Any
 
 from friso.axis import LINEAR, AxisKind, axis_of
 from friso.drives.ask import TRAVEL, TRAVELS, Ask, travel_of
-from friso.drives.drive import FORMATS, TOLD, DriveFormat
+from friso.drives.drive import FORMATS, DriveFormat
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER, FEEDBACK, FILTERS_KEY, FORCE_LIMIT, FORWARD, controller_of
+from friso.stage.rig import CONVERSIONS
 from friso.stage.section import row_keys
 
 ABOVE, MAIN, BELOW, LAST, LOWEST = range(5)
@@ -334,7 +335,7 @@ def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     An uncertain answer counts by the centre of its range.
     """
     fields = stage.numeric_keys()
-    kept = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
+    kept = {name: flat[key] for name in CONVERSIONS if (key := f"drive.{name}") in flat}
     return {
         name: value if isinstance(value, str) else f"{value!r} {fields[f'drive.{name}'].unit}"
         for name, value in kept.items()

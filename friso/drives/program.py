@@ -62,7 +62,7 @@ class floored(sp.Function):
     nargs = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Program:
     """The controller of a drive at a sample, as assignments that follow one another.
 
@@ -235,17 +235,17 @@ def program_of(flat: Mapping[str, Any]) -> Program:
     steps, (command, *updates) = straight(hoisted[: len(values)], "w")
     begins, starts = straight(hoisted[len(values) :], "b")
     return Program(
-        tuple(inputs),
-        {one: float(flat[str(one)]) for one in keys},
-        tuple(prepared),
-        tuple(symbols),
-        tuple(begins),
-        tuple(starts),
-        tuple(steps),
-        tuple(updates),
-        command,
-        float(flat["drive.sample_time"]),
-        tuple(names),
+        inputs=tuple(inputs),
+        parameters={one: float(flat[str(one)]) for one in keys},
+        prepared=tuple(prepared),
+        memories=tuple(symbols),
+        begins=tuple(begins),
+        started=tuple(starts),
+        steps=tuple(steps),
+        updates=tuple(updates),
+        command=command,
+        period=float(flat["drive.sample_time"]),
+        constants=tuple(names),
     )
 
 

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from friso.drives.ask import Ask, moving_mass
-from friso.drives.drive import FORMATS, TOLD, AsStage, AxisParameters, DriveFormat
+from friso.drives.drive import FORMATS, AsStage, AxisParameters, DriveFormat
 from friso.errors import InputError, one_line, shortened
 from friso.platform.files import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage
+from friso.stage.rig import CONVERSIONS
 from friso.stage.tables_of_files import text_of
 
 
@@ -162,7 +163,7 @@ def _with_answers(
             if not isinstance(keys, dict):
                 raise InputError(key, quoted(str(value)), "a key of a table of the stage", 'masses.stage="3 kg"')
             keys[name] = value
-        elif key in TOLD:
+        elif key in CONVERSIONS:
             tables.setdefault("drive", {}).setdefault(key, value)  # a unit that the format has read keeps its name
     friction: dict[str, Any] = tables.get("friction", {})
     if friction.get("model") == "none":

@@ -181,17 +181,17 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 AS_BUILT = ("drive", "rail", "cable", "floor")
 """Tables of the real drive and its surroundings, which analyses of the ideal machine leave out."""
 
-CONVERSIONS = frozenset(
-    {"machine_unit", "force_per_output", "length_per_unit", "velocity_per_output", "travel_per_turn"}
-)
-"""Keys of [drive] that only convert units, and so do not describe the real drive."""
+CONVERSIONS = ("machine_unit", "force_per_output", "length_per_unit", "velocity_per_output", "travel_per_turn")
+"""Keys of [drive] that only convert units, and so do not describe the real drive.
+
+They are given to friso init --from or read from a file, and friso export needs them."""
 
 
 def is_as_built(stage: Any) -> bool:
     """Tell whether a stage describes its real drive, such as its sampling, or its surroundings."""
     if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
-    return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
+    return stage.drive is not None and bool({*stage.drive.as_written()} - {*CONVERSIONS})
 
 
 def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:

@@ -63,7 +63,7 @@ SPRING = "a spring to ground acts, such as a flexure or a cable, beside bristles
 VISCOUS = "friction.viscous"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Presliding:
     """Bristles and moving mass from small motion before sliding.
 
@@ -157,8 +157,18 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     )
     correlation = correlation_of(best.covariance, changes, even)
     notes = (bearing.HELD,) if record.bent is None and between.joint else ()
-    curves = (best.time, best.position, best.force, best.model)
-    return Presliding(mass, damping, stiffness, correlation, *curves, best.left, notes)
+    return Presliding(
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        correlation=correlation,
+        time=best.time,
+        position=best.position,
+        force=best.force,
+        model=best.model,
+        unexplained=best.left,
+        warnings=notes,
+    )
 
 
 SAMPLES_OF_A_PRESLIDING_PERIOD = 40
@@ -178,8 +188,9 @@ def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
 def _nothing(why: str) -> Presliding:
     """Return a result without estimates, for the reason `why`."""
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
-    none = np.empty(0)
-    return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
+    curves = dict.fromkeys(("time", "position", "force", "model"), np.empty(0))
+    unknown = {"correlation": np.eye(len(KEYS)), "unexplained": np.nan}
+    return Presliding(mass=mass, damping=damping, stiffness=stiffness, **unknown, **curves)
 
 
 STIFFNESS_RATIO_OF_A_JOINT = 3.0

@@ -42,7 +42,7 @@ class Possible:
     closed: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FittedStribeck:
     """A Stribeck curve through forces at some speeds, with the remaining ranges.
 
@@ -231,14 +231,14 @@ class _Grid:
         fastest = forces.speeds.max()
         velocities, shapes = _between(self.velocities, fast, True), _between(self.shapes, shaped, False)
         return FittedStribeck(
-            linear(0, 1.0, shared, not ends[1]),
-            linear(1, 1 / fastest, 0.0, not ends[1]),
-            linear(2, 1.0, shared, not ends[0]),
-            Possible(float(self.velocities[best[0]]), *velocities, not any(ends)),
-            Possible(float(self.shapes[best[1]]), *shapes, open_shape and not (cut or self.apart)),
-            linear(3, 1.0, 0.0, True) if forces.both else Possible(0.0, 0.0, 0.0, False),
-            self._covariance((int(best[0]), int(best[1])), scatter, open_shape and not self.apart),
-            refuted,
+            coulomb=linear(0, 1.0, shared, not ends[1]),
+            viscous=linear(1, 1 / fastest, 0.0, not ends[1]),
+            static=linear(2, 1.0, shared, not ends[0]),
+            velocity=Possible(float(self.velocities[best[0]]), *velocities, not any(ends)),
+            exponent=Possible(float(self.shapes[best[1]]), *shapes, open_shape and not (cut or self.apart)),
+            offset=linear(3, 1.0, 0.0, True) if forces.both else Possible(0.0, 0.0, 0.0, False),
+            covariance=self._covariance((int(best[0]), int(best[1])), scatter, open_shape and not self.apart),
+            refuted=refuted,
         )
 
     def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
@@ -280,7 +280,7 @@ def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[floa
 METHOD = "mean forces over stretches of constant velocity"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Direction:
     """Friction over speed in one direction, or in both together.
 
@@ -298,7 +298,7 @@ class Direction:
     curve: FittedStribeck | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FrictionVelocity:
     """Friction over speed, in both directions, with its data.
 
@@ -358,7 +358,18 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
     if refuted:
         warnings.append(f"The forces refute the Stribeck exponent of the stage, {exponent:g}: it is fitted instead.")
-    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, moved, tuple(warnings))
+    return FrictionVelocity(
+        directions=sides,
+        both=both,
+        bias=bias,
+        velocities=velocities,
+        forces=forces,
+        half_widths=errors,
+        unsteady=unsteady,
+        places=places,
+        mass=moved,
+        warnings=tuple(warnings),
+    )
 
 
 def _mass(log: Log) -> tuple[float, float]:
@@ -474,7 +485,14 @@ def _nothing(reason: str) -> Direction:
     coulomb, viscous, static, velocity, exponent = (
         Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items()
     )
-    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
+    return Direction(
+        coulomb=coulomb,
+        viscous=viscous,
+        static=static,
+        stribeck_velocity=velocity,
+        stribeck_exponent=exponent,
+        covariance=np.empty((0, 0)),
+    )
 
 
 SPEEDS_OF_A_LINE = 3
@@ -578,15 +596,16 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
     falls = f"friction may still fall with the speed at {speeds.max() * 1e3:.3g} mm/s"
     seen = velocity.closed and velocity.value >= speeds.min() and velocity.high - velocity.low < 2 * velocity.value
     high, low = "" if curve.coulomb.closed else falls, "" if seen else rises
-    nothing = _nothing(falls)
+    nothing, at_rest = _nothing(falls), "" if curve.exponent.closed else several
+    stribeck = _ranged("stribeck_velocity", "m/s", velocity, method, low)
     return Direction(
-        _ranged("coulomb", "N", curve.coulomb, method, high),
-        _ranged("viscous", "N s/m", curve.viscous, method, high),
-        nothing.static if high else _ranged("static", "N", curve.static, method, low),
-        nothing.stribeck_velocity if high else _ranged("stribeck_velocity", "m/s", velocity, method, low),
-        _ranged("stribeck_exponent", "", curve.exponent, method, "" if curve.exponent.closed else several),
-        curve.covariance,
-        curve,
+        coulomb=_ranged("coulomb", "N", curve.coulomb, method, high),
+        viscous=_ranged("viscous", "N s/m", curve.viscous, method, high),
+        static=nothing.static if high else _ranged("static", "N", curve.static, method, low),
+        stribeck_velocity=nothing.stribeck_velocity if high else stribeck,
+        stribeck_exponent=_ranged("stribeck_exponent", "", curve.exponent, method, at_rest),
+        covariance=curve.covariance,
+        curve=curve,
     )
 
 
