@@ -77,6 +77,10 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
     return resonance if away[1] < away[0] else None
 
 
+WIDEST_PHASE = 60.0  # [deg]
+"""Largest half width of a band of the phase that is drawn. A wider one hides the others."""
+
+
 def _bode(bench: Bench, name: str) -> Figure:
     """Draw magnitudes above phases, with a column for each output."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
@@ -85,6 +89,9 @@ def _bode(bench: Bench, name: str) -> Figure:
     caption = "Measured with its 95 % band; fits drawn over the band in which they were fitted."
     if bench.lines:
         caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
+    bands = [response.band() for response in outputs]
+    if any(np.any(band.phase_high - band.phase_low > 2 * np.radians(WIDEST_PHASE)) for band in bands):
+        caption += f" Bands of the phase are cut at {WIDEST_PHASE:g}° to either side."
     if bench.departs is not None and bench.departs.frequency.determined:
         caption += " Below their band the response departs from the linear model."
     return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
@@ -117,7 +124,7 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
         Series(fine, values, "", colour, dash, 1.5)
         for (_, colour, dash, _), values in zip(curves, aligned, strict=True)
     )
-    bounded = np.clip(half, 0, 60)
+    bounded = np.clip(half, 0, WIDEST_PHASE)
     shade = Band(hertz, angle - bounded, angle + bounded, "", AREA)
     below = Panel("", frequency, Axis("Phase", "°", step=90.0), (phase, *fits), bands=(shade,))
     return above, below
