@@ -97,7 +97,7 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
     (flip,) = (point for point in document["points"] if point["cycle"] == "symmetric")
     assert flip["value"] == pytest.approx(661.3, abs=0.5)
     assert document["ends"] == {"low": "no attracting cycle", "high": "attracting cycle"}
-    assert done.stderr == ""
+    assert all("compiling" in line for line in done.stderr.splitlines())
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def test_commands_write_their_files(host: str, axis: Path) -> None:
     """Files are replaced unless another program holds them; names of devices are refused on Windows alone."""
     document = json.loads(friso(host, axis, "check", "axis.toml", "--json", "--out", "Größe"))
     assert document["cases"]["given"]["verdict"] in ("hunts", "settles", "bistable", "transient")
-    assert {path.name for path in (axis / "Größe").iterdir()} >= {"report.html", ".friso-output"}
+    assert "report.html" in {path.name for path in (axis / "Größe").iterdir()}
     assert Page((axis / "Größe" / "report.html").read_text(encoding="utf-8")).text
     export = ("export", "axis.toml", "--out", "run")
     for _ in range(2):

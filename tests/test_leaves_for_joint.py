@@ -124,6 +124,7 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     assert written.flat()["flexure.length"] == made.stage.flat()["flexure.length"]
     paths = [Path("tuned") / name for name in files]
     assert TuneAnswer(tuning).next_steps(paths) == [
+        "friso export tuned/tuned.toml",
         "friso design tuned/tuned-isolator.toml",
         "friso flexure tuned/tuned-isolator-of-leaf-springs.toml",
     ]
@@ -151,4 +152,5 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
     names = [name for name in further_files(doubted) if "leaf-springs" in name]
     assert all("not-sure" in name for name in names)
     paths = [Path("tuned") / name for name in further_files(doubted)]
-    assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
+    steps = ["friso export tuned/tuned.toml", "friso design tuned/tuned-isolator.toml"]
+    assert TuneAnswer(doubted).next_steps(paths) == steps
