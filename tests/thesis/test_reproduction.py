@@ -850,12 +850,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     counted = cycles_.comparison
     assert counted.cells == 9
     assert counted.both + counted.neither + counted.counted_only + counted.attracted_only + counted.unknown == 9
-    near = [
-        (x, y)
-        for edge in cycles_.edges
-        for x, y in zip(edge.x, edge.y, strict=True)
-        if 1.2 < y < 2.2
-    ]
+    near = [(x, y) for edge in cycles_.edges for x, y in zip(edge.x, edge.y, strict=True) if 1.2 < y < 2.2]
     crossover = np.interp(1.7, *np.array(sorted((y, x) for x, y in near)).T)
     edge = find_margin(study.stage(), attracting=True)
     assert crossover == pytest.approx(edge.crossover, rel=0.02)

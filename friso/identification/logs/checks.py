@@ -131,6 +131,7 @@ _STANDS_FOR_NONE = re.compile(r"-?9{2,}(\.0|\.25|\.9+)?")
 """Numbers that instruments write where they have no value: -9999, -999.25."""
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def absent(values: np.ndarray) -> float | None:
     """Return the number in a signal that stands for no value, such as -9999; None without one."""
     finite = values[np.isfinite(values)]
@@ -152,6 +153,7 @@ STEP_OF_A_DROPOUT = 10.0
 """Least step into a dropout and out of it, over the largest of 99 % of all steps."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # huge values are no dropouts
 def dropouts(values: np.ndarray) -> np.ndarray:
     """Return which values of a signal, (n,), are dropouts: short zeros between alike values far from zero."""
     lost = np.zeros(values.size, bool)
