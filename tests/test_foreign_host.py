@@ -86,7 +86,7 @@ def test_commands_write_their_files(host: str, axis: Path) -> None:
     assert document["cases"]["given"]["verdict"] in ("hunts", "settles", "bistable", "transient")
     assert "report.html" in {path.name for path in (axis / "Größe").iterdir()}
     assert Page((axis / "Größe" / "report.html").read_text(encoding="utf-8")).text
-    export = ("export", "axis.toml", "--out", "run")
+    export = ("export", "axis.toml", "--out", "run", "--overwrite")
     for _ in range(2):
         friso(host, axis, *export)
     assert not list(axis.rglob(f"{DRAFTS}*"))
@@ -95,8 +95,8 @@ def test_commands_write_their_files(host: str, axis: Path) -> None:
     assert (axis / "con.toml").exists() == (host == "darwin")
     if host == "win32":
         with next(path for path in there if path.suffix == ".html").open("rb") as held:
-            message = " ".join(friso(host, axis, *export, status=2).split())
-        assert f"{Path(held.name).name} cannot be replaced" in message
+            message = " ".join(friso(host, axis, *export, status=1).split())
+        assert Path(held.name).name in message
         assert "open in another program" in message
         assert there == {path: path.read_bytes() for path in (axis / "run").iterdir()}
 
