@@ -387,6 +387,15 @@ def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> N
     assert ends == pytest.approx(COULOMB + VISCOUS * 0.05 * np.pi, rel=0.03)
 
 
+def test_a_profile_without_ends_or_costs_is_drawn_as_far_as_it_is_known() -> None:
+    """A run that fails costs infinitely much, and an interval may be open; neither may lose the answer."""
+    result, _ = moves(own_loop=True, fitted_in_loop=True)
+    mass = result.profiles["mass"]
+    odd = replace(mass, low=-np.inf, high=np.nan, cost=np.array([np.nan, -np.inf, *mass.cost[2:]]))
+    (panel,) = figure_of(replace(result, profiles={"mass": odd}), "profiles").panels
+    assert [*panel.bands[0].x] == [mass.values[0], mass.values[-1]]
+
+
 def test_profiles_are_1_where_the_interval_ends() -> None:
     result, _ = moves(own_loop=True, fitted_in_loop=True)
     figure, profile = figure_of(result, "profiles"), result.profiles["mass"]

@@ -310,13 +310,14 @@ def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: boo
     """
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > RATIO_OF_A_LOGARITHMIC_AXIS * profile.values[0]
-    lowest = min(-0.2, 1.2 * float(worse.min()))
+    lowest = min(-0.2, 1.2 * float(worse[np.isfinite(worse)].min(initial=0.0)))
     y = Axis("Worse by", "", (lowest, MISFIT_AT_THE_TOP))
     unit = unit_of(parameter.unit)
     ends = (float(profile.values[0]), float(profile.values[-1]))
     x = Axis(name_of(profile.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
+    interval = np.array([profile.low, profile.high])  # it may be open
     shade = Band(
-        np.array([profile.low, profile.high]),
+        np.clip(np.where(np.isnan(interval), ends, interval), *ends),
         np.full(2, lowest),
         np.full(2, MISFIT_AT_THE_TOP),
         "",
