@@ -850,8 +850,8 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     counted = cycles_.comparison
     assert counted.cells == 9
     assert counted.both + counted.neither + counted.counted_only + counted.attracted_only + counted.unknown == 9
-    near = [(x, y) for edge in cycles_.edges for x, y in zip(edge.x, edge.y, strict=True) if 1.2 < y < 2.2]
-    crossover = np.interp(1.7, *np.array(sorted((y, x) for x, y in near)).T)
+    (curve,) = cycles_.edges
+    crossover = np.interp(1.7, curve.y, curve.x)
     edge = find_margin(study.stage(), attracting=True)
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
     shown = replace(thorough_study, cycles={"system": cycles_})
